@@ -5,6 +5,7 @@ use avastra_lang::model::command::OFFSET_M;
 use avastra_road::{LanePlace, Side};
 
 use super::action::{Dynamics, Over, Target};
+use super::order::is_aside;
 use super::phases::{Told, instead_of};
 use super::said::Said;
 use super::scene::{Cast, Moving};
@@ -12,6 +13,12 @@ use super::source::{Mark, Source};
 
 /// The fastest that somebody is told to move aside, m/s.
 const ASIDE_MPS_MAX: f64 = 10.0;
+
+/// Who moves aside faster than this part of its speed is markedly slower along its way in the file's player.
+const SLOW_PART: f64 = 0.15;
+
+/// A way is looked at in such steps for the roads that it leads over, m.
+const ROADS_M: f64 = 10.0;
 
 /// A way is looked at in such steps for lanes beside it, m.
 const LOOK_M: f64 = 0.5;
@@ -30,11 +37,47 @@ impl<'a> Cast<'a> {
     /// A way to the left in the road's direction as one to the left of somebody in a lane of it, on its way.
     pub fn left_m(&self, moving: &Moving, told: &Told, left_m: f64) -> f64 {
         let Some(place) = told.lane else { return left_m };
-        let lane = self.map.lane(place.lane);
-        let turned_rad =
-            wrap_angle(moving.path.heading_at(told.at_m) - lane.centre.heading_at(place.station_m));
-        let goes_with_lane = turned_rad.abs() < core::f64::consts::FRAC_PI_2;
-        if goes_with_lane == lane.is_along() { left_m } else { -left_m }
+        let is_along = self.map.lane(place.lane).is_along();
+        if self.goes_with_lane(moving, told.at_m, place) == is_along { left_m } else { -left_m }
+    }
+
+    /// Whether somebody drives in the direction of a lane that it is in.
+    fn goes_with_lane(&self, moving: &Moving, at_m: f64, place: LanePlace) -> bool {
+        let lane_rad = self.map.lane(place.lane).centre.heading_at(place.station_m);
+        wrap_angle(moving.path.heading_at(at_m) - lane_rad).abs() < core::f64::consts::FRAC_PI_2
+    }
+
+    /// Refuses an offset of somebody whose way leads over roads with another direction.
+    pub fn keeps_its_sides(
+        &self,
+        source: &mut Source,
+        moving: &Moving,
+        mark: &Mark,
+        told: &Told,
+    ) -> Option<()> {
+        self.is_the_same_throughout(source, moving, mark, (told, false))
+    }
+
+    /// Refuses a place across in the road's terms of somebody whose way leads over roads in which these are others.
+    fn is_the_same_throughout(
+        &self,
+        source: &mut Source,
+        moving: &Moving,
+        mark: &Mark,
+        (told, has_number): (&Told, bool),
+    ) -> Option<()> {
+        let Some(own) = told.lane else { return Some(()) };
+        let key = |place: LanePlace| {
+            let lane = self.map.lane(place.lane);
+            (has_number.then_some(lane.key.lane), lane.is_along())
+        };
+        let steps = ((moving.path.length_m() - told.at_m) / ROADS_M) as usize;
+        let is_other = (0..=steps).any(|step| {
+            let pose = moving.path.pose_at(told.at_m + step as f64 * ROADS_M);
+            self.places.borrow().in_plane(pose).lane.is_some_and(|place| key(place) != key(own))
+        });
+        let reason = "its way leads over roads whose lanes have other numbers, and on which of them it is by then is not known";
+        source.refuse_if(is_other, mark, reason)
     }
 
     /// Where on its way, across, somebody is so much to the left of another one: as both begin, and as both are then.
@@ -73,20 +116,30 @@ impl<'a> Cast<'a> {
         let Some(own) = told.lane else { return source.refuse(mark, "it drives in no lane") };
         let to = match target {
             Target::Beside(name, lanes) => {
-                let of = match () {
-                    () if *name == moving.entity.name => own,
+                let (of, goes_with) = match () {
+                    () if *name == moving.entity.name => (own, self.goes_with_lane(moving, told.at_m, own)),
                     () => {
                         let placed = self.places.borrow_mut().of(source, mark, name)?;
                         let Some(lane) = placed.lane else {
                             return source.refuse(mark, "that one is in no lane");
                         };
-                        lane
+                        let other = self.moving.iter().find(|other| other.entity.name == *name);
+                        let acts =
+                            other.iter().flat_map(|other| &other.entity.events).flat_map(|event| &event.acts);
+                        let reason =
+                            format!("`{name}` moves aside: in which lane it is by then is not known");
+                        source.refuse_if(acts.into_iter().any(is_aside), mark, reason)?;
+                        if self.is_ego(name) {
+                            source.note("lanes beside the ego vehicle are those beside where it begins");
+                        }
+                        (lane, other.is_none_or(|other| self.goes_with_lane(other, other.at_m, lane)))
                     }
                 };
                 // Beside this one, wherever the other one is along the road.
-                self.lane_beside(own, of, *lanes)
+                self.lane_beside(own, of, if goes_with { *lanes } else { -*lanes })
             }
             Target::Lane(id) => {
+                self.is_the_same_throughout(source, moving, mark, (told, true))?;
                 let lane = self.map.lane(own.lane);
                 let s_m = lane.road_station_m(own.station_m);
                 self.map.place(&lane.key.road, *id, s_m).ok()
@@ -207,6 +260,9 @@ pub fn aside_fields(
     };
     if aside_mps > ASIDE_MPS_MAX || matches!(dynamics.over, Over::AtOnce) {
         source.note(format!("nobody moves aside faster than {ASIDE_MPS_MAX} m/s"));
+    }
+    if told.mps.is_none_or(|mps| aside_mps > SLOW_PART * mps) {
+        source.note("who moves aside, or brakes while it does, keeps its speed along its way, and is up to a metre or two ahead");
     }
     fields.push(Said::text("aside: ").number(aside_mps.clamp(0.1, ASIDE_MPS_MAX), "m/s"));
     Some(())

@@ -444,6 +444,10 @@ fn way(source: &mut Source, action: Node) -> Option<Way> {
         let (more_s, times) =
             (source.number_or(timing, "offset", 0.0)?, source.number_or(timing, "scale", 1.0)?);
         source.refuse_if(times <= 0.0, timing, format!("`scale` is {times}: times go on, by more than 0"))?;
+        if times != 1.0 {
+            source
+                .note("the times of a trajectory are those of its places times `scale`, and `offset` later");
+        }
         found = Some((more_s, times));
     }
     Some(Way { shape, from_m, timing: found, is_absolute })

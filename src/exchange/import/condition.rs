@@ -5,7 +5,9 @@ use avastra_world::sim::VehicleParameters;
 
 use super::across::LanesBeside;
 use super::action::{ActKind, Speed};
+use super::order::is_aside;
 use super::phases::ARRIVES_M;
+use super::position::Position;
 use super::said::Said;
 use super::scene::{Cast, Moving};
 use super::source::{Mark, Source};
@@ -20,6 +22,11 @@ const PASSED_M: f64 = 1.0;
 
 /// What a distance beside the way may change of one along it, m.
 const ASIDE_M: f64 = 0.5;
+
+/// What differs by less from a bound is just there, m.
+const JUST_M: f64 = 1e-6;
+
+const AT_ITS_BOUND: &str = "as they begin it is just at its bound, and whether it holds cannot be told";
 
 /// The words before a phase.
 #[derive(Debug, Clone, Default)]
@@ -129,7 +136,9 @@ impl Waiting<'_, '_> {
                 "an event waits some time after another has ended, or for a moment, and not for both";
             let is_both = begins.after_s > 0.0 && only.kind != When::Always;
             source.refuse_if(is_both, &only.mark, reason)?;
-            begins.after_s += only.delay_s;
+            if !matches!(only.kind, When::After(_)) {
+                begins.after_s += only.delay_s;
+            }
             if let When::Stands { seconds, .. } = &only.kind {
                 begins.held_s = *seconds;
             }
@@ -173,16 +182,14 @@ impl Waiting<'_, '_> {
             When::Always => Some(Said::text("elapsed >= ").number(0.0, "s")),
             When::Never => source.refuse(mark, "it never comes"),
             When::Contact(_) => source.refuse(mark, "what others do after a contact of two is not read"),
-            When::After(seconds) => Some(Said::text("elapsed >= ").number(*seconds, "s")),
+            When::After(seconds) => Some(Said::text("elapsed >= ").number(seconds + condition.delay_s, "s")),
             When::Headway { pair, seconds } => {
                 let of = self.who(source, mark, &pair.of)?;
                 let bound = Said::text(format!("{of}.speed * ")).number(*seconds, "s");
                 let bound_m = self.cast.begins_mps(source, mark, &pair.of)? * seconds;
                 self.is_along(source, mark, pair, Some(bound_m))?;
-                if !self.is_behind(source, mark, pair)? {
-                    source.note("a headway of one who is ahead is its distance from the one behind it, by its own speed");
-                }
-                self.distance(source, mark, pair, &bound)
+                self.is_beyond_doubt(source, mark, pair, bound_m)?;
+                self.headway(source, mark, pair, &of, &bound)
             }
             When::Collides { pair, seconds } => {
                 self.is_along(source, mark, pair, None)?;
@@ -205,11 +212,14 @@ impl Waiting<'_, '_> {
             When::Distance { pair, metres } => {
                 let bound = Said::default().number(*metres, "m");
                 self.is_along(source, mark, pair, Some(*metres))?;
+                self.is_beyond_doubt(source, mark, pair, *metres)?;
                 self.distance(source, mark, pair, &bound)
             }
             When::Apart { pair, metres } => {
                 source.note("distances across the road are taken across the ego vehicle's route");
                 let metres = metres + if pair.is_free_space { self.cast.half_widths_m(pair) } else { 0.0 };
+                let is_just = (self.apart_m(source, mark, pair)? - metres).abs() < JUST_M;
+                source.refuse_if(is_just, mark, AT_ITS_BOUND)?;
                 let (of, to) = (self.who(source, mark, &pair.of)?, self.who(source, mark, &pair.to)?);
                 let (above, below) = (pair.rule.sign(), pair.rule.against().sign());
                 let word = if pair.rule.is_less() { "and" } else { "or" };
@@ -220,6 +230,8 @@ impl Waiting<'_, '_> {
             }
             When::Clear(room) => self.clear(source, mark, room),
             When::Reaches { entity, position, within_m, is_less } => {
+                self.stays(source, &position.0)?;
+                self.stays_beside(source, condition, entity)?;
                 let point = self.cast.place(source, &position.0)?.pose.position;
                 let (said, station_m) = self.station(source, mark, entity, point)?;
                 let aside_m = self.aside_m(source, mark, entity, point)?;
@@ -258,9 +270,11 @@ impl Waiting<'_, '_> {
                 let (of, to) = (self.who(source, mark, of)?, self.who(source, mark, to)?);
                 Some(Said::text(format!("{of}.speed - {to}.speed {} ", rule.sign())).number(*mps, "m/s"))
             }
-            When::Nears { entity, position, seconds } => {
+            When::Nears { entity, position, seconds, is_free_space } => {
+                self.stays(source, &position.0)?;
                 let point = self.cast.place(source, &position.0)?.pose.position;
                 let (said, station_m) = self.station(source, mark, entity, point)?;
+                let station_m = station_m - if *is_free_space { self.cast.front_m(entity) } else { 0.0 };
                 let who = self.who(source, mark, entity)?;
                 let said = said.and(format!(" + {who}.speed * ")).number(*seconds, "s");
                 Some(said.and(" >= ").number(station_m, "m"))
@@ -382,6 +396,34 @@ impl Waiting<'_, '_> {
         }
     }
 
+    /// That the way from somebody to another one that is ahead of it is less or more than a bound. Of one that is behind, or of who
+    /// stands, there is no headway.
+    fn headway(&self, source: &mut Source, mark: &Mark, pair: &Pair, of: &str, bound: &Said) -> Option<Said> {
+        let (back, front) = match self.cast.looks_ahead(source, mark, &pair.of)? {
+            true => (&pair.of, &pair.to),
+            false => (&pair.to, &pair.of),
+        };
+        let way = self.between(source, mark, back, front, pair.is_free_space)?;
+        let said = way.clone().and(format!(" {} ", pair.rule.sign())).then(bound.clone());
+        Some(match pair.rule.is_less() {
+            false => {
+                Said::text("(").then(said).and(format!(" and {of}.speed > ")).number(0.0, "m/s").and(")")
+            }
+            true if self.is_first && self.is_ahead(source, mark, pair)? => said,
+            true => {
+                let nearest = match pair.is_free_space {
+                    // Beside each other there is no room between the outlines, and no headway.
+                    true => {
+                        let (back, front) = (self.who(source, mark, back)?, self.who(source, mark, front)?);
+                        Said::text(format!("{front}.front - {back}.rear"))
+                    }
+                    false => way,
+                };
+                said.and(" and ").then(nearest).and(" >= ").number(0.0, "m")
+            }
+        })
+    }
+
     /// The distance of two, less or more than a bound. Less it becomes from the side from which the first one comes.
     fn distance(&self, source: &mut Source, mark: &Mark, pair: &Pair, bound: &Said) -> Option<Said> {
         let is_apart =
@@ -435,6 +477,33 @@ impl Waiting<'_, '_> {
             source.refuse_if(goes_across, mark, reason)?;
         }
         Some(())
+    }
+
+    /// Refuses a way that is just at its bound as the scenario begins, and stays there: whether it holds depends on the last digit.
+    fn is_beyond_doubt(&self, source: &mut Source, mark: &Mark, pair: &Pair, bound_m: f64) -> Option<()> {
+        let is_just = bound_m > 0.0
+            && (self.away_m(source, mark, pair)? - bound_m).abs() < JUST_M
+            && self.closes_mps(source, mark, pair)? == 0.0;
+        source.refuse_if(is_just, mark, AT_ITS_BOUND)
+    }
+
+    /// Refuses a place beside somebody who may be elsewhere by then.
+    fn stays(&self, source: &mut Source, place: &Position) -> Option<()> {
+        self.cast.stays(source, place)
+    }
+
+    /// Refuses to ask for a place of somebody who moves aside on the way there: the place counts across, too.
+    fn stays_beside(&self, source: &mut Source, condition: &Condition, entity: &str) -> Option<()> {
+        if self.cast.is_ego(entity) {
+            return Some(());
+        }
+        let events = &self.cast.moving(source, &condition.mark, entity)?.entity.events;
+        // What it does once it has been there does not count.
+        let waits = |event: &&Event| event.when.iter().flatten().any(|own| own.mark == condition.mark);
+        let before = events.iter().take_while(|event| !waits(event));
+        let moves_aside = before.flat_map(|event| &event.acts).any(is_aside);
+        let reason = format!("`{entity}` moves aside: places are read of those that keep to their way");
+        source.refuse_if(moves_aside, &condition.mark, reason)
     }
 
     /// How far a point is beside the way of somebody, m.
@@ -502,7 +571,9 @@ impl Waiting<'_, '_> {
 
 /// Whether a condition holds a time, which only a condition of its own keeps.
 fn needs_alone(condition: &Condition) -> bool {
-    condition.delay_s > 0.0 || matches!(condition.kind, When::Stands { seconds, .. } if seconds > 0.0)
+    let is_time = matches!(condition.kind, When::After(_));
+    condition.delay_s > 0.0 && !is_time
+        || matches!(condition.kind, When::Stands { seconds, .. } if seconds > 0.0)
 }
 
 /// Whether a place is reached for a moment only.

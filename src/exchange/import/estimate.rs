@@ -17,12 +17,8 @@ impl Waiting<'_, '_> {
                 pair.rule.holds(away_m, *metres)
             }
             When::Apart { pair, metres } => {
-                let of = self.cast.begins(source, mark, &pair.of)?;
-                let to = self.cast.begins(source, mark, &pair.to)?;
-                let offset_m = |point: Vec2| self.cast.route.path.project(point).offset_m;
                 let metres = metres + if pair.is_free_space { self.cast.half_widths_m(pair) } else { 0.0 };
-                let apart_m = (offset_m(of) - offset_m(to)).abs();
-                pair.rule.holds(apart_m, metres)
+                pair.rule.holds(self.apart_m(source, mark, pair)?, metres)
             }
             When::Clear(room) => {
                 let beside = self.beside(source, mark, room)?;
@@ -53,8 +49,8 @@ impl Waiting<'_, '_> {
             }
             When::Headway { pair, seconds } => {
                 let away_m = self.away_m(source, mark, pair)?;
-                let bound_m = self.cast.begins_mps(source, mark, &pair.of)? * seconds;
-                pair.rule.holds(away_m, bound_m)
+                let mps = self.cast.begins_mps(source, mark, &pair.of)?;
+                self.is_ahead(source, mark, pair)? && mps > 0.0 && pair.rule.holds(away_m, mps * seconds)
             }
             When::Collides { pair, seconds } => {
                 self.away_m(source, mark, pair)? < self.closes_mps(source, mark, pair)? * seconds
@@ -71,7 +67,7 @@ impl Waiting<'_, '_> {
                 let ahead_m = self.ahead_m(source, mark, entity, position)?;
                 (ahead_m.abs() <= *within_m) == *is_less
             }
-            When::Nears { entity, position, seconds } => {
+            When::Nears { entity, position, seconds, .. } => {
                 let way_m = self.cast.begins_mps(source, mark, entity)? * seconds;
                 self.ahead_m(source, mark, entity, position)? <= way_m
             }
@@ -133,7 +129,12 @@ impl Waiting<'_, '_> {
             When::Distance { pair, metres } => gap(source, pair, *metres),
             When::Headway { pair, seconds } => {
                 let bound_m = self.cast.begins_mps(source, mark, &pair.of)? * seconds;
-                gap(source, pair, bound_m)
+                if self.is_ahead(source, mark, pair)? {
+                    return gap(source, pair, bound_m);
+                }
+                // It must first be passed.
+                let more_m = if pair.rule.is_less() { 0.0 } else { bound_m };
+                Some(takes_s(self.away_m(source, mark, pair)? + more_m, self.closes_mps(source, mark, pair)?))
             }
             When::Travelled { entity, metres } => {
                 Some(takes_s(*metres, self.cast.begins_mps(source, mark, entity)?))
@@ -195,7 +196,7 @@ impl Waiting<'_, '_> {
     }
 
     /// How fast two come nearer to each other as they begin, m/s.
-    fn closes_mps(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<f64> {
+    pub fn closes_mps(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<f64> {
         let of_mps = self.cast.begins_mps(source, mark, &pair.of)?;
         let to_mps = self.cast.begins_mps(source, mark, &pair.to)?;
         Some(match self.is_behind(source, mark, pair)? {
@@ -219,8 +220,15 @@ impl Waiting<'_, '_> {
         Some(of? != to?)
     }
 
+    /// How far two are from each other across the ego vehicle's route at the beginning, m.
+    pub fn apart_m(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<f64> {
+        let [of, to] = [&pair.of, &pair.to].map(|name| self.cast.begins(source, mark, name));
+        let offset_m = |point: Vec2| self.cast.route.path.project(point).offset_m;
+        Some((offset_m(of?) - offset_m(to?)).abs())
+    }
+
     /// How far two are from each other at the beginning, m.
-    fn away_m(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<f64> {
+    pub fn away_m(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<f64> {
         let (of, to) = (self.cast.begins(source, mark, &pair.of)?, self.cast.begins(source, mark, &pair.to)?);
         let away_m = (self.cast.station_m(of) - self.cast.station_m(to)).abs();
         if !pair.is_free_space {
@@ -231,6 +239,11 @@ impl Waiting<'_, '_> {
         let less_m = self.cast.overhang_m(source, mark, front, false)?
             + self.cast.overhang_m(source, mark, back, true)?;
         Some((away_m - less_m).max(0.0))
+    }
+
+    /// Whether the second of two begins ahead of the first, as that looks.
+    pub fn is_ahead(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<bool> {
+        Some(self.is_behind(source, mark, pair)? == self.cast.looks_ahead(source, mark, &pair.of)?)
     }
 
     /// Whether the first of two begins behind the second along the ego vehicle's route.

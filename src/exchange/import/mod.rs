@@ -172,7 +172,10 @@ pub fn openscenario(text: &str, request: &Request, files: &dyn Files) -> Result<
     let of_scenario = |refusals: Vec<Refusal>, values: &Values| {
         let pairs: Vec<String> = values.iter().map(|(name, value)| format!("{name} = {value}")).collect();
         let with = |refusal: Refusal| {
-            let reason = format!("{} (where {})", refusal.reason, pairs.join(", "));
+            let reason = match pairs.is_empty() {
+                true => refusal.reason,
+                false => format!("{} (where {})", refusal.reason, pairs.join(", ")),
+            };
             Refusal { scenario: Some(path.clone()), reason, ..refusal }
         };
         refusals.into_iter().map(with).collect::<Vec<_>>()
@@ -201,7 +204,9 @@ pub fn openscenario(text: &str, request: &Request, files: &dyn Files) -> Result<
             whole.description = distribution.description;
             whole.notes.extend(source.notes());
             if repeated > 0 {
-                let note = format!("variations with the values of another one, which count once: {repeated}");
+                let note = format!(
+                    "variations with the values of another one, which make one row with it: {repeated}"
+                );
                 whole.notes.insert(note);
             }
             Ok(write::space(&whole, &distribution.parameters, name))

@@ -12,7 +12,7 @@ use super::story::Event;
 use super::trigger::{Condition, Edge, Pair, PlaceMark, Rule, Trigger, When};
 
 /// What is estimated to come so much later is later, s.
-const LATER_S: f64 = 0.5;
+const LATER_S: f64 = 0.1;
 
 /// Times that differ by less are the same, s.
 const LEAST_S: f64 = 1e-6;
@@ -21,8 +21,12 @@ const LEAST_S: f64 = 1e-6;
 #[derive(Debug, Clone, Copy, Default)]
 struct Times {
     comes_s: Option<f64>,
+    /// When it comes at the earliest.
+    least_s: Option<f64>,
     ends_s: Option<f64>,
     takes_s: Option<f64>,
+    /// Whether it comes by what stands directly before it.
+    is_made_to_come: bool,
     /// The least time by which it comes after what stands before it.
     later_s: f64,
 }
@@ -45,8 +49,15 @@ impl<'a> Cast<'a> {
         let mut mps = Some(moving.mps);
         // The least and the greatest speed that it is told, as long as they are known.
         let mut told_mps = Some((moving.mps, moving.mps));
+        // Which of them changes its speed first, and when at the earliest: what is asked about it is estimated until then.
+        let mut changes: Option<(usize, f64)> = None;
         for event in events {
-            let comes_s = waiting.comes_s(source, &event.when, &|when| sequence.time_s(when));
+            let estimate_s = waiting.comes_s(source, &event.when, &|when| sequence.time_s(when));
+            let is_changed = changes.filter(|_| event.asks_about(&moving.entity.name));
+            let (comes_s, least_s) = match (is_changed, estimate_s) {
+                (Some((_, changed_s)), Some(estimate_s)) if estimate_s > changed_s => (None, Some(changed_s)),
+                _ => (estimate_s, estimate_s),
+            };
             let takes_s = event.acts.iter().map(|act| takes_s(act, &mut mps));
             let takes_s =
                 takes_s.collect::<Option<Vec<f64>>>().map(|all| all.into_iter().fold(0.0, f64::max));
@@ -59,31 +70,52 @@ impl<'a> Cast<'a> {
             };
             let later_s =
                 told_mps.and_then(|told_mps| waiting.takes_at_least_s(source, &event.when, told_mps));
-            let later_s = later_s.unwrap_or(0.0);
-            sequence.events.push((event, Times { comes_s, ends_s, takes_s, later_s }));
+            // As they begin it never comes: what stands directly before it changes that.
+            let is_made_to_come = estimate_s == Some(f64::INFINITY)
+                && changes.is_none_or(|(changer, _)| changer + 1 == sequence.events.len());
+            let later_s = later_s.filter(|_| is_made_to_come).unwrap_or(0.0);
+            if changes.is_none() && event.acts.iter().any(is_speed) {
+                changes = Some((sequence.events.len(), least_s.unwrap_or(0.0)));
+            }
+            let times = Times { comes_s, least_s, ends_s, takes_s, is_made_to_come, later_s };
+            sequence.events.push((event, times));
             if event.acts.iter().any(is_speed) {
                 told_mps = told_mps.zip(mps).map(|((least, most), mps)| (mps.min(least), mps.max(most)));
             }
         }
         for pair in sequence.events.windows(2) {
             let [(before, earlier), (event, later)] = pair else { continue };
-            if before.when.is_empty() || event.waits_for(before) || is_implied(&before.when, &event.when) {
-                continue;
-            }
-            if same_moment(before, event) {
+            if !before.when.is_empty() && same_moment(before, event) {
                 let is_cut = event.overwrites && event.is_beside(before) && earlier.comes_s != earlier.ends_s;
                 let reason = "it ends another event of its manoeuvre at the moment at which that begins";
                 source.refuse_if(is_cut, &event.mark, reason)?;
                 continue;
             }
-            let reason = match (earlier.comes_s, later.comes_s) {
+            let has_come = |when: &When| {
+                sequence.time_s(when).zip(later.least_s).is_some_and(|(came_s, least_s)| came_s <= least_s)
+            };
+            if before.when.is_empty()
+                || event.waits_for(before)
+                || is_implied(&before.when, &event.when, has_come)
+            {
+                continue;
+            }
+            // The driving system may bring about another order.
+            let note =
+                format!("what `{}` does is taken to come in the order of the file", moving.entity.name);
+            let reason = match (earlier.comes_s, later.least_s) {
                 (Some(earlier_s), Some(later_s))
                     if earlier_s.is_finite() && later_s >= earlier_s - LATER_S =>
                 {
+                    if before.time_s().is_none() || event.time_s().is_none() {
+                        source.note(note);
+                    }
                     continue;
                 }
-                // As they begin it never comes: what stands before it changes that.
-                (None, Some(f64::INFINITY)) => continue,
+                (None, _) if later.is_made_to_come => {
+                    source.note(note);
+                    continue;
+                }
                 (Some(earlier_s), Some(later_s)) if earlier_s.is_finite() => format!(
                     "as they begin, it comes at {later_s:.1} s, and what stands before it at {earlier_s:.1} s: what one does is read in the order in which it comes"
                 ),
@@ -154,6 +186,32 @@ impl<'e> Sequence<'e> {
         self.under_way(event).any(|other| other.acts.iter().any(|act| is_speed(act) && takes_time(act)))
     }
 
+    /// Refuses to wait for the end of a move to the side that goes on for a way, of one whose speed may change on it.
+    pub fn ends_as_it_begins(&self, source: &mut Source, event: &Event) -> Option<()> {
+        let of_way = |act: &Act| match &act.kind {
+            ActKind::Lane(_, _, dynamics) | ActKind::Offset(_, dynamics) => {
+                matches!(dynamics.over, Over::Way(_))
+            }
+            _ => false,
+        };
+        for (other, _) in &self.events {
+            let waits = event.waits_for_the_end_of(other) && other.acts.iter().any(of_way);
+            let changes = |acts: &[Act]| acts.iter().any(|act| is_speed(act) && takes_time(act));
+            let at_once = |act: &Act| is_aside(act) && !takes_time(act);
+            let is_slower = event.waits_for_the_end_of(other) && other.acts.iter().all(at_once);
+            let reason =
+                "it waits for the end of a step to the side, for which a vehicle here needs its time";
+            source.refuse_if(is_slower && !other.acts.is_empty(), &event.mark, reason)?;
+            let reason = "it waits for the end of a move to the side over a way, on which the speed changes";
+            source.refuse_if(
+                waits && (self.changes_speed_at(other) || changes(&other.acts)),
+                &event.mark,
+                reason,
+            )?;
+        }
+        Some(())
+    }
+
     /// The field that ends a speed which an event overwrites and says nothing of. To the side nothing may be under way.
     pub fn ends_what_goes_on(&self, source: &mut Source, event: &Event) -> Option<Option<Said>> {
         let mut field = None;
@@ -188,12 +246,36 @@ impl Event {
         self.waits_in_all(|when| matches!(when, When::Ended { kind, name } if is_called(other, kind, name)))
     }
 
+    /// Whether a condition is about an entity.
+    fn asks_about(&self, name: &str) -> bool {
+        self.when.iter().flatten().any(|condition| match &condition.kind {
+            When::Headway { pair, .. }
+            | When::Distance { pair, .. }
+            | When::Apart { pair, .. }
+            | When::Collides { pair, .. } => pair.of == name || pair.to == name,
+            When::Clear(_) => true,
+            When::Reaches { entity, .. }
+            | When::Travelled { entity, .. }
+            | When::Stands { entity, .. }
+            | When::Speed { entity, .. }
+            | When::Nears { entity, .. } => entity == name,
+            When::Faster { of, to, .. } => of == name || to == name,
+            When::Always
+            | When::Never
+            | When::Contact(_)
+            | When::After(_)
+            | When::Ended { .. }
+            | When::Begun { .. } => false,
+        })
+    }
+
     fn waits_in_all(&self, is_meant: impl Fn(&When) -> bool) -> bool {
         !self.when.is_empty() && self.when.iter().all(|all| all.iter().any(|one| is_meant(&one.kind)))
     }
 }
 
-fn is_aside(act: &Act) -> bool {
+/// Whether something leads to the side.
+pub fn is_aside(act: &Act) -> bool {
     matches!(act.kind, ActKind::Lane(..) | ActKind::Offset(..))
 }
 
@@ -249,11 +331,21 @@ fn takes_s(act: &Act, mps: &mut Option<f64>) -> Option<f64> {
     }
 }
 
-/// Whether what one trigger waits for holds only once what another one waits for has held: the same of the same two, and farther on.
-fn is_implied(before: &Trigger, then: &Trigger) -> bool {
-    let (before, then) = (only(before), only(then));
-    let ([before], [then]) = (before.as_slice(), then.as_slice()) else { return false };
-    if before.delay_s > then.delay_s {
+/// Whether what one trigger waits for holds only once what another one waits for has held: in one of its groups the same of the same
+/// two, less far on, and what has come by then.
+fn is_implied(before: &Trigger, then: &Trigger, has_come: impl Fn(&When) -> bool) -> bool {
+    let [all] = then.as_slice() else { return false };
+    let then: Vec<&Condition> = all.iter().filter(|one| one.kind != When::Always).collect();
+    let [then] = then.as_slice() else { return false };
+    let is_before =
+        |one: &Condition| one.kind == When::Always || has_come(&one.kind) || is_farther_on(one, then);
+    before.iter().any(|all| all.iter().all(is_before))
+}
+
+/// Whether the second condition holds only once the first one has held.
+fn is_farther_on(before: &Condition, then: &Condition) -> bool {
+    let ceases = |one: &Condition| matches!(one.edge, Edge::Falling | Edge::Either);
+    if before.delay_s > then.delay_s || ceases(before) || ceases(then) {
         return false;
     }
     let is_farther = |first: (Rule, f64), second: (Rule, f64)| match (first.0.is_less(), second.0.is_less()) {
@@ -290,19 +382,11 @@ fn is_of_the_same(pair: &Pair, then: &Pair) -> bool {
     pair.of == then.of && pair.to == then.to && pair.is_straight == then.is_straight && is_as_far
 }
 
-/// The conditions of a trigger with one group, but for what always holds.
-fn only(trigger: &Trigger) -> Vec<&Condition> {
-    match trigger.as_slice() {
-        [all] => all.iter().filter(|one| one.kind != When::Always).collect(),
-        _ => Vec::new(),
-    }
-}
-
 impl Waiting<'_, '_> {
     /// Refuses what is not so at one moment: edges beside others, the ends of what several do, and what waits for itself.
     pub fn comes_as_said(&self, source: &mut Source, trigger: &Trigger) -> Option<()> {
         for all in trigger {
-            edges_are_alone(source, all)?;
+            edges_are_alone(source, trigger, all)?;
         }
         for condition in trigger.iter().flatten() {
             let (When::Ended { kind, name } | When::Begun { kind, name }) = &condition.kind else { continue };
@@ -313,8 +397,36 @@ impl Waiting<'_, '_> {
             };
             let reason = format!("several do `{name}`: when all of them have begun or ended it is not read");
             source.refuse_if(self.cast.moving.iter().filter(does).count() > 1, &condition.mark, reason)?;
+            self.is_one_moment(source, condition, kind, name)?;
             let reason = format!("it waits for `{name}`, and that, by way of others, for itself");
             source.refuse_if(self.cast.waits_for_itself(kind, name), &condition.mark, reason)?;
+        }
+        Some(())
+    }
+
+    /// Refuses what begins or ends with the first or the last of several things, unless they come one after the other.
+    fn is_one_moment(
+        &self,
+        source: &mut Source,
+        condition: &Condition,
+        kind: &str,
+        name: &str,
+    ) -> Option<()> {
+        let of = self.cast.moving.iter().map(|moving| &moving.entity.events);
+        for events in of {
+            let events: Vec<&Event> = events.iter().filter(|event| is_called(event, kind, name)).collect();
+            let has_several = events.iter().any(|event| event.acts.len() > 1);
+            let reason = "its event does several things, and when this one of them has ended is not read";
+            source.refuse_if(kind == "action" && has_several, &condition.mark, reason)?;
+            if matches!(kind, "action" | "event") {
+                continue;
+            }
+            let is_chain = events.windows(2).all(|pair| pair[1].waits_for_the_end_of(pair[0]));
+            let reason = format!("`{name}` has several events, which do not wait for each other");
+            source.refuse_if(!is_chain, &condition.mark, reason)?;
+            let reason = format!("a {kind} begins with its act: name one of its events");
+            let begins = matches!(condition.kind, When::Begun { .. });
+            source.refuse_if(begins && !events.is_empty(), &condition.mark, reason)?;
         }
         Some(())
     }
@@ -366,7 +478,7 @@ impl Waiting<'_, '_> {
 }
 
 /// Refuses an edge beside other conditions: they would have to hold at its very moment.
-fn edges_are_alone(source: &mut Source, all: &[Condition]) -> Option<()> {
+fn edges_are_alone(source: &mut Source, trigger: &Trigger, all: &[Condition]) -> Option<()> {
     let (of_act, own): (Vec<&Condition>, Vec<&Condition>) =
         all.iter().filter(|one| one.kind != When::Always).partition(|one| one.is_of_act);
     for some in [&of_act, &own] {
@@ -376,9 +488,20 @@ fn edges_are_alone(source: &mut Source, all: &[Condition]) -> Option<()> {
             return source.refuse(&edge.mark, reason);
         }
     }
+    for own in own.iter().filter(|one| one.is_running && all.len() > 1) {
+        let (When::Begun { name, .. } | When::Ended { name, .. }) = &own.kind else { continue };
+        // What holds while it runs, and after it, holds from its beginning.
+        let is_after =
+            |other: &Condition| matches!(&other.kind, When::Ended { name: ended, .. } if ended == name);
+        let goes_on = trigger.iter().any(|other| other.iter().any(is_after));
+        let reason =
+            format!("it ceases to hold when `{name}` has ended, beside other conditions that may come later");
+        source.refuse_if(!goes_on, &own.mark, reason)?;
+    }
     let latest_s = of_act.iter().map(|one| one.time_s()).collect::<Option<Vec<f64>>>();
     let latest_s = latest_s.map(|times| times.into_iter().fold(0.0, f64::max));
-    for condition in own.iter().filter(|one| !of_act.is_empty() && one.edge != Edge::None) {
+    let waits = |one: &&&Condition| one.edge != Edge::None || one.delay_s > 0.0;
+    for condition in own.iter().filter(|_| !of_act.is_empty()).filter(waits) {
         let is_later = match &condition.kind {
             When::After(seconds) => latest_s.is_some_and(|latest_s| *seconds >= latest_s),
             When::Ended { .. } | When::Begun { .. } => true,

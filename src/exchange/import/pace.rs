@@ -129,6 +129,15 @@ impl<'a> Cast<'a> {
         if dynamics.peak > 1.0 && !matches!(dynamics.over, Over::AtOnce) {
             source.note("speeds change evenly, also where the file has a curve");
         }
+        if told.mps == mps && mps.is_some() && matches!(dynamics.over, Over::Time(_) | Over::Way(_)) {
+            source.note("who is to change to the speed that it has is done at once");
+        }
+        if let (false, Speed::More(name, _) | Speed::Times(name, _)) = (is_continuous, wanted)
+            && !matches!(dynamics.over, Over::AtOnce)
+            && !self.keeps_its_speed(name)
+        {
+            source.note("a speed relative to another's is that at the beginning of its change, unless it is `continuous`");
+        }
         let rate = match (dynamics.over, told.mps, mps) {
             (Over::AtOnce | Over::Never, ..) => None,
             (Over::Rate(rate), ..) => Some(Said::default().number(rate.abs() / dynamics.peak, "m/s^2")),
@@ -278,6 +287,8 @@ impl<'a> Cast<'a> {
     ) -> Option<()> {
         let reason = "only the ego vehicle is met";
         source.refuse_if(!self.is_ego(&meeting.master), mark, reason)?;
+        self.stays(source, &meeting.master_at)?;
+        self.stays(source, &meeting.own_at)?;
         let ego = &self.story.ego.body;
         let point = self.place(source, &meeting.master_at)?.pose.position;
         // The file says where its reference point is; the language where the front is.
@@ -288,7 +299,10 @@ impl<'a> Cast<'a> {
         fields.push(Said::text("at: ").number(ego_m, "m"));
         fields.push(Said::text("reach: ").number(reach_m, "m"));
         let mps = match &meeting.speed {
-            None => None,
+            None => {
+                source.note("who is to arrive with no speed of the file's drives evenly, from the beginning of its action on");
+                None
+            }
             Some(Speed::Absolute(mps)) => Some(*mps),
             Some(Speed::More(_, more)) => Some(speed(source, self.story, &self.story.ego, 0)? + more),
             Some(Speed::Times(_, times)) => Some(speed(source, self.story, &self.story.ego, 0)? * times),

@@ -6,12 +6,12 @@ use avastra_road::LanePlace;
 use super::across::aside_fields;
 use super::action::{Act, ActKind, Aside, Speed};
 use super::condition::Waiting;
+use super::order::is_aside;
 use super::pace::{self, PACE, too_fast};
 use super::said::Said;
 use super::scene::{Cast, Moving};
 use super::source::Source;
 use super::story::Event;
-use super::trigger::When;
 use super::ways::Leg;
 
 /// A distance that is to be reached is, this near to it, m, as for esmini.
@@ -49,8 +49,6 @@ impl<'a> Cast<'a> {
         events.retain(|event| !(event.when.is_empty() && event.acts.iter().all(is_placed)));
         if events.iter().all(|event| event.time_s().is_some()) {
             events.sort_by(|a, b| a.time_s().unwrap_or(0.0).total_cmp(&b.time_s().unwrap_or(0.0)));
-        } else if events.iter().filter(|event| waits_by_itself(event)).count() > 1 {
-            source.note(format!("what `{}` does is taken to come in the order of the file", entity.name));
         }
         let sequence = self.in_sequence(source, moving, &events)?;
         let mut told = Told {
@@ -142,10 +140,15 @@ impl<'a> Cast<'a> {
                     if fields.is_empty() {
                         fields.extend(sequence.ends_what_goes_on(source, event)?);
                     }
+                    sequence.ends_as_it_begins(source, event)?;
                     if sequence.changes_speed_at(event) {
                         told.mps = None;
                     }
                 }
+            }
+            let mut aside = acts.iter().filter(|act| is_aside(act));
+            if let (Some(_), Some(second)) = (aside.next(), aside.next()) {
+                return source.refuse(&second.mark, "another move to the side begins at the same moment");
             }
             let mut timed = Vec::new();
             let mut own: Option<Takes> = None;
@@ -167,6 +170,9 @@ impl<'a> Cast<'a> {
                             reason,
                         )?;
                         // Without times it goes on with the speed that it has, which is 0 where nothing tells it more.
+                        let stands = told.mps == Some(0.0) && way.shape.drops_times;
+                        let reason = "its times are not read, and it stands: `Polyline` is read with times";
+                        source.refuse_if(stands, &act.mark, reason)?;
                         let then = if way.timing.is_some() {
                             let then;
                             (timed, then) =
@@ -176,6 +182,10 @@ impl<'a> Cast<'a> {
                             source.refuse_if(waits, &act.mark, TIMES_LATER)?;
                             then
                         } else {
+                            let stands = told.mps == Some(0.0) && way.shape.drops_times;
+                            let reason =
+                                "its times are not read, and it stands: `Polyline` is read with times";
+                            source.refuse_if(stands, &act.mark, reason)?;
                             arrives(leg.end_m)
                         };
                         Takes::add(&mut own, then, way.timing.is_none());
@@ -302,6 +312,7 @@ impl<'a> Cast<'a> {
                 aside_fields(source, mark, to_m, to, *dynamics, told, fields)
             }
             ActKind::Offset(Aside::InLane(offset_m), dynamics) => {
+                self.keeps_its_sides(source, moving, mark, told)?;
                 let to_m = told.lane_m + self.left_m(moving, told, *offset_m);
                 let to = Said::default().number(to_m, "m");
                 aside_fields(source, mark, to_m, to, *dynamics, told, fields)
@@ -342,15 +353,12 @@ pub fn instead_of(fields: &mut Vec<Said>, names: &[&str]) {
     fields.retain(|field| !names.contains(&field.name().as_str()));
 }
 
-/// Whether an event waits for something that is neither a time nor the end of another.
-fn waits_by_itself(event: &Event) -> bool {
-    let is_own = |kind: &When| !matches!(kind, When::After(_) | When::Always | When::Ended { .. });
-    event.when.iter().flatten().any(|condition| is_own(&condition.kind))
-}
-
 pub fn same_moment(a: &Event, b: &Event) -> bool {
     a.when.len() == b.when.len()
         && a.when.iter().zip(&b.when).all(|(a, b)| {
-            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.kind == b.kind && a.delay_s == b.delay_s)
+            a.len() == b.len()
+                && a.iter()
+                    .zip(b)
+                    .all(|(a, b)| a.kind == b.kind && a.edge == b.edge && a.delay_s == b.delay_s)
         })
 }

@@ -12,6 +12,9 @@ use super::position::{Beside, Heading, Position, PositionKind};
 use super::source::{Mark, Source};
 use super::story::Story;
 
+/// Who looks along a lane within this angle drives along it, rad: a player's drivers keep their lanes.
+const ALONG_RAD: f64 = 0.3;
+
 /// A way that is laid along lanes is followed this far, m.
 const WAY_M_MAX: f64 = 12_000.0;
 
@@ -354,12 +357,12 @@ impl<'a> Places<'a> {
 impl Placed {
     /// Whether it stands along its lane.
     pub fn is_along(&self) -> bool {
-        self.lane.is_some() && self.turned_rad.abs() < 0.1
+        self.lane.is_some() && self.turned_rad.abs() < ALONG_RAD
     }
 
     /// Whether it looks against its lane.
     pub fn is_against(&self) -> bool {
-        self.lane.is_some() && self.turned_rad.abs() > PI - 0.1
+        self.lane.is_some() && self.turned_rad.abs() > PI - ALONG_RAD
     }
 
     /// A short straight way on from here, m.

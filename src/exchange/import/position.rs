@@ -200,6 +200,22 @@ fn on_route(source: &mut Source, place: Node) -> Option<PositionKind> {
 }
 
 impl Position {
+    /// The entity beside which it is.
+    pub fn relative_to(&self) -> Option<&str> {
+        match &self.kind {
+            PositionKind::RelativeLane { entity, .. }
+            | PositionKind::RelativeRoad { entity, .. }
+            | PositionKind::RelativeWorld { entity, .. }
+            | PositionKind::RelativeObject { entity, .. }
+            | PositionKind::Entity(entity) => Some(entity),
+            PositionKind::Lane { .. }
+            | PositionKind::Road { .. }
+            | PositionKind::World { .. }
+            | PositionKind::OnRoute { .. }
+            | PositionKind::OnTrajectory { .. } => None,
+        }
+    }
+
     /// Whether it is where somebody is already, who looks on as before.
     pub fn is_own_place(&self, name: &str) -> bool {
         let PositionKind::RelativeObject { entity, dx_m, dy_m } = &self.kind else { return false };

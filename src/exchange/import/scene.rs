@@ -289,6 +289,19 @@ impl<'a> Cast<'a> {
         self.places.borrow_mut().placed(source, position)
     }
 
+    /// Refuses a place that is relative to somebody who may be elsewhere later on.
+    pub fn stays(&self, source: &mut Source, place: &Position) -> Option<()> {
+        let Some(name) = place.relative_to() else { return Some(()) };
+        let moves = match self.moving.iter().find(|moving| moving.entity.name == name) {
+            Some(moving) => {
+                moving.mps != 0.0 || moving.entity.way.is_some() || !moving.entity.events.is_empty()
+            }
+            None => true,
+        };
+        let reason = format!("it is relative to `{name}`, which may be elsewhere by then");
+        source.refuse_if(moves, &place.mark, reason)
+    }
+
     /// What an entity is called in a phase of the actor.
     pub fn called(&self, source: &mut Source, mark: &Mark, actor: &Moving, name: &str) -> Option<String> {
         match () {
@@ -363,6 +376,11 @@ impl<'a> Cast<'a> {
             false => self.story.entity(name).map_or(0.0, |entity| entity.body.width_m),
         };
         (width_m(&pair.of) + width_m(&pair.to)) / 2.0
+    }
+
+    /// From the reference point of somebody's body in the file to its front, m.
+    pub fn front_m(&self, name: &str) -> f64 {
+        self.story.entity(name).map_or(0.0, |entity| entity.body.middle_m + entity.body.length_m / 2.0)
     }
 
     /// How far an end of somebody's outline lies beyond its reference point along the ego vehicle's route, m.
@@ -445,8 +463,14 @@ impl<'a> Cast<'a> {
                     let after =
                         |place: &LanePlace| place.lane != lane.lane || place.station_m > lane.station_m;
                     ways.extend(route.into_iter().filter(after));
-                    if ways.len() < 2 {
-                        ways.extend(straight_on(&self.map, begin).0);
+                    // A route's end is no end of the way, unless the map's is there.
+                    let (end, last) = (ways.len(), ways[ways.len() - 1]);
+                    let is_on =
+                        |place: &LanePlace| place.lane != last.lane || place.station_m > last.station_m;
+                    ways.extend(straight_on(&self.map, last).0.into_iter().filter(is_on));
+                    if end > 1 && self.map.way(&ways).is_err() {
+                        source.note(format!("the way of `{}` ends with its route", entity.name));
+                        ways.truncate(end);
                     }
                 }
                 None => ways.extend(straight_on(&self.map, begin).0),

@@ -29,6 +29,8 @@ const STEPS: usize = 16;
 #[derive(Debug, Clone)]
 pub struct Shape {
     pub mark: Mark,
+    /// Whether it has times that are not read.
+    pub drops_times: bool,
     kind: ShapeKind,
 }
 
@@ -85,6 +87,7 @@ fn shape_in(source: &mut Source, trajectory: Node) -> Option<Shape> {
         return source.refuse(outer, "it is empty");
     };
     let mark = source.mark(inner);
+    let mut drops_times = false;
     let kind = match inner.tag_name().name() {
         "Polyline" => {
             let mut vertices = Vec::new();
@@ -126,6 +129,7 @@ fn shape_in(source: &mut Source, trajectory: Node) -> Option<Shape> {
             let name = if inner.has_attribute("curvaturePrime") { "curvaturePrime" } else { "curvatureDot" };
             let to_per_m = from_per_m + source.number(inner, name)? * length_m;
             if inner.has_attribute("startTime") || inner.has_attribute("stopTime") {
+                drops_times = true;
                 source.note("the times of a clothoid are not taken over: its road user keeps its speed");
             }
             ShapeKind::Spline(vec![Segment { start, from_per_m, to_per_m, length_m }])
@@ -137,6 +141,7 @@ fn shape_in(source: &mut Source, trajectory: Node) -> Option<Shape> {
                 let place = source.required(node, "Position")?;
                 controls.push((position(source, place)?, source.number_or(node, "weight", 1.0)?));
                 if node.has_attribute("time") {
+                    drops_times = true;
                     source.note(
                         "the times of control points are not taken over: their road user keeps its speed",
                     );
@@ -160,7 +165,7 @@ fn shape_in(source: &mut Source, trajectory: Node) -> Option<Shape> {
         }
         _ => return source.refuse(inner, "such a shape is not read"),
     };
-    Some(Shape { mark, kind })
+    Some(Shape { mark, drops_times, kind })
 }
 
 impl Shape {

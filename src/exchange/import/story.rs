@@ -5,6 +5,8 @@ use std::collections::BTreeSet;
 
 use roxmltree::{Document, Node};
 
+use avastra_lang::model::COMMANDED_MAX;
+
 use crate::export::SPEED_LIMIT;
 
 use super::action::{Act, ActKind, Headway, Over, Speed, Way, act};
@@ -188,6 +190,10 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>) -> Opti
     let description = header.attribute("description").unwrap_or("").to_owned();
     let limit_mps = own_limit_mps(source, header);
     let Cast { ego, others, changes, .. } = cast;
+    if let Some(other) = others.get(COMMANDED_MAX as usize) {
+        let reason = format!("a file has at most {COMMANDED_MAX} road users beside the ego vehicle");
+        return source.refuse(&other.mark, reason);
+    }
     Some(Story { map, ego, others, weather: sky, changes, duration_s, limit_mps, description })
 }
 
@@ -633,26 +639,25 @@ fn is_carried_out(source: &mut Source, node: Node) -> bool {
     }
 }
 
-/// When the scenario ends: the latest time that its stop trigger names, or in which the ego vehicle goes as far as it names.
+/// When the scenario ends: at the first of the times that its stop trigger names, each with what must come beside it, or when the ego
+/// vehicle can have gone as far as it names.
 fn duration_s(source: &mut Source, storyboard: Node, ego: &str, ego_mps: f64) -> f64 {
-    let mut latest_s: f64 = 0.0;
     let trigger = element(storyboard, "StopTrigger");
-    for node in trigger.iter().flat_map(|trigger| trigger.descendants()) {
-        if node.has_tag_name("SimulationTimeCondition") && is_less(source, node) == Some(false) {
-            latest_s = latest_s.max(source.number(node, "value").unwrap_or(0.0));
+    let (mut latest_s, mut surely_s): (f64, f64) = (0.0, f64::INFINITY);
+    for group in trigger.iter().flat_map(|trigger| elements(*trigger, "ConditionGroup")) {
+        let (mut group_s, mut is_known): (f64, bool) = (0.0, true);
+        for condition in elements(group, "Condition") {
+            let delay_s = source.number_or(condition, "delay", 0.0).unwrap_or(0.0);
+            let own_s = ends_s(source, condition, ego, ego_mps);
+            group_s = group_s.max(own_s.map_or(0.0, |(own_s, _)| own_s + delay_s));
+            is_known &= own_s.is_some_and(|(_, is_known)| is_known);
         }
-        if node.has_tag_name("TraveledDistanceCondition") && ego_mps > 0.0 {
-            let by = node.ancestors().find(|outer| outer.has_tag_name("ByEntityCondition"));
-            let mut refs =
-                by.iter().flat_map(|by| by.descendants().filter(|node| node.has_tag_name("EntityRef")));
-            if refs.any(|node| node.attribute("entityRef") == Some(ego))
-                && let Some(way_m) = source.number(node, "value")
-            {
-                // Half as long again, for one that slows down, and some seconds to come to a stop.
-                latest_s = latest_s.max(1.5 * way_m / ego_mps + 5.0);
-            }
+        latest_s = latest_s.max(group_s);
+        if is_known && group_s > 0.0 {
+            surely_s = surely_s.min(group_s);
         }
     }
+    let latest_s = latest_s.min(surely_s);
     if latest_s <= 0.0 {
         source.note(format!("the file names no time above 0 for its end: {DURATION_S} s are played"));
         return DURATION_S;
@@ -661,4 +666,19 @@ fn duration_s(source: &mut Source, storyboard: Node, ego: &str, ego_mps: f64) ->
         source.note(format!("{DURATION_S_MAX} s are played of the file's {latest_s:.0}"));
     }
     latest_s.min(DURATION_S_MAX)
+}
+
+/// When a condition of the stop trigger comes, s, and whether that is known for certain.
+fn ends_s(source: &mut Source, condition: Node, ego: &str, ego_mps: f64) -> Option<(f64, bool)> {
+    let named = |name: &str| condition.descendants().find(|node| node.has_tag_name(name));
+    if let Some(node) = named("SimulationTimeCondition") {
+        return (!is_less(source, node)?).then_some((source.number(node, "value")?, true));
+    }
+    let node = named("TraveledDistanceCondition").filter(|_| ego_mps > 0.0)?;
+    let by = named("ByEntityCondition")?;
+    let mut refs = by.descendants().filter(|node| node.has_tag_name("EntityRef"));
+    let is_of_ego = refs.any(|node| node.attribute("entityRef") == Some(ego));
+    let way_m = source.number(node, "value").filter(|_| is_of_ego)?;
+    // Half as long again, for one that slows down, and some seconds to come to a stop.
+    Some((1.5 * way_m / ego_mps + 5.0, false))
 }

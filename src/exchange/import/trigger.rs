@@ -28,6 +28,8 @@ const STATES: [&str; 7] = [
     "completeState",
 ];
 
+const OUTLINE: &str = "the way of somebody's outline to a place is not read: `freespace=\"false\"` is";
+
 const ROUTING: [&str; 5] = ["assignedRoute", "fastest", "leastIntersections", "shortest", "undefined"];
 
 /// Groups, of which one must hold; in a group all conditions must.
@@ -42,6 +44,8 @@ pub struct Condition {
     pub kind: When,
     /// Whether it begins the act, in which the event then waits for its own conditions.
     pub is_of_act: bool,
+    /// Whether it holds while an element runs, and ceases with that.
+    pub is_running: bool,
 }
 
 impl Condition {
@@ -49,7 +53,7 @@ impl Condition {
     pub fn time_s(&self) -> Option<f64> {
         match self.kind {
             When::Always => Some(0.0),
-            When::After(seconds) => Some(seconds),
+            When::After(seconds) => Some(seconds + self.delay_s),
             _ => None,
         }
     }
@@ -173,6 +177,8 @@ pub enum When {
         entity: String,
         position: PlaceMark,
         seconds: f64,
+        /// From its outline.
+        is_free_space: bool,
     },
     /// An element of the story has ended: its kind and its name.
     Ended {
@@ -278,7 +284,7 @@ fn condition(source: &mut Source, node: Node) -> Option<Trigger> {
     let delay_s = source.number_or(node, "delay", 0.0)?;
     source.refuse_if(delay_s < 0.0, node, "its `delay` is less than 0")?;
     let edge = source.word(node, "conditionEdge", &["none", "rising", "falling", "risingOrFalling"])?;
-    let edge = match edge {
+    let mut edge = match edge {
         "rising" => Edge::Rising,
         "falling" => Edge::Falling,
         "risingOrFalling" => Edge::Either,
@@ -286,17 +292,16 @@ fn condition(source: &mut Source, node: Node) -> Option<Trigger> {
     };
     if let Some(value) = element(node, "ByValueCondition") {
         let Some(inner) = children(value).next() else { return source.refuse(value, "it is empty") };
-        let mut delay_s = delay_s;
+        let mut is_running = false;
         let kind = match inner.tag_name().name() {
             "SimulationTimeCondition" => {
                 let seconds = source.number(inner, "value")?;
                 if is_less(source, inner)? {
                     return source.refuse(inner, "only times that have passed are read");
                 }
-                let after_s = seconds + core::mem::take(&mut delay_s);
                 let reason = "times do not cease: `conditionEdge=\"falling\"` waits for nothing";
                 source.refuse_if(edge == Edge::Falling, node, reason)?;
-                if after_s <= 0.0 { When::Always } else { When::After(after_s) }
+                if seconds + delay_s <= 0.0 { When::Always } else { When::After(seconds) }
             }
             "StoryboardElementStateCondition" => {
                 let of = source.word(inner, "storyboardElementType", &STORYBOARD_ELEMENTS)?;
@@ -304,6 +309,11 @@ fn condition(source: &mut Source, node: Node) -> Option<Trigger> {
                 let reason = "of a state it is read that it begins, not that it ceases";
                 source.refuse_if(matches!(edge, Edge::Falling | Edge::Either), inner, reason)?;
                 let name = source.text(inner, "storyboardElementRef")?;
+                // A transition lasts for a moment, as an edge does.
+                if matches!(state, "startTransition" | "endTransition") {
+                    edge = Edge::Rising;
+                }
+                is_running = state == "runningState";
                 match state {
                     "startTransition" | "runningState" if of == "story" => When::Always,
                     "startTransition" | "runningState" if of == "act" => {
@@ -344,6 +354,7 @@ fn condition(source: &mut Source, node: Node) -> Option<Trigger> {
             delay_s,
             kind,
             is_of_act: false,
+            is_running,
         }]]);
     }
     let by_entity = source.required(node, "ByEntityCondition")?;
@@ -361,7 +372,14 @@ fn condition(source: &mut Source, node: Node) -> Option<Trigger> {
     let mut found = Vec::new();
     for of in &names {
         let kind = of_entity(source, inner, of)?;
-        found.push(Condition { mark: source.mark(inner), edge, delay_s, kind, is_of_act: false });
+        found.push(Condition {
+            mark: source.mark(inner),
+            edge,
+            delay_s,
+            kind,
+            is_of_act: false,
+            is_running: false,
+        });
     }
     Some(if rule == "all" { vec![found] } else { found.into_iter().map(|one| vec![one]).collect() })
 }
@@ -391,10 +409,12 @@ fn of_entity(source: &mut Source, inner: Node, of: &str) -> Option<When> {
             source.refuse_if(!rule.is_less(), inner, "only `lessThan` is read")?;
             let seconds = source.amount(inner, "value")?;
             if let Some(place) = element(target, "Position") {
-                When::Nears { entity, position: PlaceMark(position(source, place)?), seconds }
+                let position = PlaceMark(position(source, place)?);
+                When::Nears { entity, position, seconds, is_free_space }
             } else {
                 let to = source.required(target, "EntityRef")?;
                 let to = source.text(to, "entityRef")?;
+                source.refuse_if(entity == to, inner, "it asks about one entity and itself")?;
                 let is_straight = is_straight(inner);
                 When::Collides { pair: Pair { of: entity, to, rule, is_free_space, is_straight }, seconds }
             }
@@ -409,6 +429,8 @@ fn of_entity(source: &mut Source, inner: Node, of: &str) -> Option<When> {
             let place = source.required(inner, "Position")?;
             let within_m = source.amount(inner, "value")?;
             let is_less = is_less(source, inner)?;
+            let is_free_space = source.switch(inner, "freespace", false)?;
+            source.refuse_if(is_free_space, inner, OUTLINE)?;
             When::Reaches { entity, position: PlaceMark(position(source, place)?), within_m, is_less }
         }
         "TraveledDistanceCondition" => When::Travelled { entity, metres: source.amount(inner, "value")? },
@@ -525,6 +547,7 @@ fn pair(source: &mut Source, node: Node, of: &str) -> Option<Pair> {
     let to = source.text(node, "entityRef")?;
     let is_free_space = source.switch(node, "freespace", false)?;
     let is_straight = is_straight(node);
+    source.refuse_if(of == to, node, "it asks about one entity and itself")?;
     Some(Pair { of: of.to_owned(), to, rule: rule(source, node)?, is_free_space, is_straight })
 }
 

@@ -94,6 +94,8 @@ impl<'a> Cast<'a> {
         if let Some(lane) = onwards {
             let points = self.places.borrow().onwards(lane);
             joined.points.extend(points.into_iter().skip(1));
+        } else if joined.legs.last().is_some_and(|leg| leg.timed.is_empty()) {
+            source.note("who comes to the end of a trajectory beside the lanes stands there");
         }
         let path = Rc::new(Path::through(&joined.points)?);
         // Only a way that begins with a trajectory begins in the middle of it.
