@@ -71,6 +71,10 @@ impl<'a> Cast<'a> {
             let lane = self.map.lane(place.lane);
             (has_number.then_some(lane.key.lane), lane.is_along())
         };
+        let road = &self.map.lane(own.lane).key.road;
+        if self.map.lanes.iter().all(|lane| lane.key.road == *road) {
+            return Some(());
+        }
         let steps = ((moving.path.length_m() - told.at_m) / ROADS_M) as usize;
         let is_other = (0..=steps).any(|step| {
             let pose = moving.path.pose_at(told.at_m + step as f64 * ROADS_M);
