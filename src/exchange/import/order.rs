@@ -25,6 +25,8 @@ struct Times {
     least_s: Option<f64>,
     ends_s: Option<f64>,
     takes_s: Option<f64>,
+    /// Whether it is a change to the speed that is there already, which takes a time in the file.
+    is_idle: bool,
     /// Whether it comes by what stands directly before it.
     is_made_to_come: bool,
     /// The least time by which it comes after what stands before it.
@@ -58,6 +60,10 @@ impl<'a> Cast<'a> {
                 (Some((_, changed_s)), Some(estimate_s)) if estimate_s > changed_s => (None, Some(changed_s)),
                 _ => (estimate_s, estimate_s),
             };
+            let is_idle = event.acts.iter().any(|act| match &act.kind {
+                ActKind::Speed(Speed::Absolute(to_mps), _) => mps == Some(*to_mps) && takes_time(act),
+                _ => false,
+            });
             let takes_s = event.acts.iter().map(|act| takes_s(act, &mut mps));
             let takes_s =
                 takes_s.collect::<Option<Vec<f64>>>().map(|all| all.into_iter().fold(0.0, f64::max));
@@ -77,7 +83,7 @@ impl<'a> Cast<'a> {
             if changes.is_none() && event.acts.iter().any(is_speed) {
                 changes = Some((sequence.events.len(), least_s.unwrap_or(0.0)));
             }
-            let times = Times { comes_s, least_s, ends_s, takes_s, is_made_to_come, later_s };
+            let times = Times { comes_s, least_s, ends_s, takes_s, is_idle, is_made_to_come, later_s };
             sequence.events.push((event, times));
             if event.acts.iter().any(is_speed) {
                 told_mps = told_mps.zip(mps).map(|((least, most), mps)| (mps.min(least), mps.max(most)));
@@ -194,7 +200,9 @@ impl<'e> Sequence<'e> {
             }
             _ => false,
         };
-        for (other, _) in &self.events {
+        for (other, times) in &self.events {
+            let reason = "it waits for the end of a change to the speed that is there already, which is done at once here";
+            source.refuse_if(times.is_idle && event.waits_for_the_end_of(other), &event.mark, reason)?;
             let waits = event.waits_for_the_end_of(other) && other.acts.iter().any(of_way);
             let changes = |acts: &[Act]| acts.iter().any(|act| is_speed(act) && takes_time(act));
             let at_once = |act: &Act| is_aside(act) && !takes_time(act);
