@@ -46,6 +46,15 @@ impl<'a> Cast<'a> {
         moving: &Moving<'a>,
         events: &[&'e Event],
     ) -> Option<Sequence<'e>> {
+        let sequence = self.estimated(source, moving, events);
+        for pair in sequence.events.windows(2) {
+            sequence.keeps_order(source, moving, &pair[0], &pair[1])?;
+        }
+        Some(sequence)
+    }
+
+    /// When these events come, as far as that is known.
+    fn estimated<'e>(&self, source: &mut Source, moving: &Moving<'a>, events: &[&'e Event]) -> Sequence<'e> {
         let waiting = Waiting::at_first(self, moving);
         let mut sequence = Sequence { events: Vec::new() };
         let mut mps = Some(moving.mps);
@@ -89,56 +98,60 @@ impl<'a> Cast<'a> {
                 told_mps = told_mps.zip(mps).map(|((least, most), mps)| (mps.min(least), mps.max(most)));
             }
         }
-        for pair in sequence.events.windows(2) {
-            let [(before, earlier), (event, later)] = pair else { continue };
-            if !before.when.is_empty() && same_moment(before, event) {
-                let is_cut = event.overwrites && event.is_beside(before) && earlier.comes_s != earlier.ends_s;
-                let reason = "it ends another event of its manoeuvre at the moment at which that begins";
-                source.refuse_if(is_cut, &event.mark, reason)?;
-                continue;
-            }
-            let has_come = |when: &When| {
-                sequence.time_s(when).zip(later.least_s).is_some_and(|(came_s, least_s)| came_s <= least_s)
-            };
-            if before.when.is_empty()
-                || event.waits_for(before)
-                || is_implied(&before.when, &event.when, has_come)
-            {
-                continue;
-            }
-            // The driving system may bring about another order.
-            let note =
-                format!("what `{}` does is taken to come in the order of the file", moving.entity.name);
-            let reason = match (earlier.comes_s, later.least_s) {
-                (Some(earlier_s), Some(later_s))
-                    if earlier_s.is_finite() && later_s >= earlier_s - LATER_S =>
-                {
-                    if before.time_s().is_none() || event.time_s().is_none() {
-                        source.note(note);
-                    }
-                    continue;
-                }
-                (None, _) if later.is_made_to_come => {
-                    source.note(note);
-                    continue;
-                }
-                (Some(earlier_s), Some(later_s)) if earlier_s.is_finite() => format!(
-                    "as they begin, it comes at {later_s:.1} s, and what stands before it at {earlier_s:.1} s: what one does is read in the order in which it comes"
-                ),
-                _ => {
-                    let other = before.name();
-                    format!(
-                        "whether it comes after `{other}` is not known, and what one does is read in the order in which it comes"
-                    )
-                }
-            };
-            return source.refuse(&event.mark, reason);
-        }
-        Some(sequence)
+        sequence
     }
 }
 
 impl<'e> Sequence<'e> {
+    /// Refuses an event that is not known to come after the one that stands before it.
+    fn keeps_order(
+        &self,
+        source: &mut Source,
+        moving: &Moving,
+        (before, earlier): &(&Event, Times),
+        (event, later): &(&Event, Times),
+    ) -> Option<()> {
+        if !before.when.is_empty() && same_moment(before, event) {
+            let is_cut = event.overwrites && event.is_beside(before) && earlier.takes_s != Some(0.0);
+            let reason = "it ends another event of its manoeuvre at the moment at which that begins";
+            source.refuse_if(is_cut, &event.mark, reason)?;
+            return Some(());
+        }
+        let has_come = |when: &When| {
+            self.time_s(when).zip(later.least_s).is_some_and(|(came_s, least_s)| came_s <= least_s)
+        };
+        if before.when.is_empty()
+            || event.waits_for(before)
+            || is_implied(&before.when, &event.when, has_come)
+        {
+            return Some(());
+        }
+        // The driving system may bring about another order.
+        let note = format!("what `{}` does is taken to come in the order of the file", moving.entity.name);
+        let reason = match (earlier.comes_s, later.least_s) {
+            (Some(earlier_s), Some(later_s)) if earlier_s.is_finite() && later_s >= earlier_s - LATER_S => {
+                if before.time_s().is_none() || event.time_s().is_none() {
+                    source.note(note);
+                }
+                return Some(());
+            }
+            (None, _) if later.is_made_to_come => {
+                source.note(note);
+                return Some(());
+            }
+            (Some(earlier_s), Some(later_s)) if earlier_s.is_finite() => format!(
+                "as they begin, it comes at {later_s:.1} s, and what stands before it at {earlier_s:.1} s: what one does is read in the order in which it comes"
+            ),
+            _ => {
+                let other = before.name();
+                format!(
+                    "whether it comes after `{other}` is not known, and what one does is read in the order in which it comes"
+                )
+            }
+        };
+        source.refuse(&event.mark, reason)
+    }
+
     pub fn events(&self) -> Vec<&'e Event> {
         self.events.iter().map(|(event, _)| *event).collect()
     }
