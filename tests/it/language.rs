@@ -8,13 +8,26 @@ use avastra::model::vocabulary::{
     Priority, ROAD_LANES, ROAD_USER, RoadField, RoadKind, ScenarioClaim, Side, SpaceClaim, SpawnField,
     StartField, StopReason, TYPES, Then, TimeOfDay, TrafficRule, Verb, WAIT, Word, WordFact,
 };
-use avastra::model::{Avoidability, COUNTED, ENDS, MODULES};
+use avastra::model::{Avoidability, COUNTED, ENDS, MODULES, body};
 use avastra::syntax::Diagnostic;
 use avastra::syntax::keyword::keywords;
 use avastra::units::UNITS;
 
 use crate::cases::root;
 use crate::world::loaded;
+
+#[test]
+fn the_bodies_of_the_page_are_the_engines() {
+    let page = page();
+    for body in Body::ALL {
+        let size = body::parameters(*body);
+        let (length_m, width_m, height_m) = (size.length_m, size.width_m, size.height_m);
+        let (gains_mps2, loses_mps2) = (size.acceleration_mps2_max, size.deceleration_mps2_max);
+        let row =
+            format!("| `{}` | {length_m}, {width_m}, {height_m} | {gains_mps2}, {loses_mps2} |", body.name());
+        assert!(page.contains(&row), "{row}");
+    }
+}
 
 fn page() -> String {
     std::fs::read_to_string(root().join("LANGUAGE.md")).expect("the page is there")
