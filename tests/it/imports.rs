@@ -266,7 +266,7 @@ fn profiles_of_speeds_keep_their_times() {
     let later = r#"<SimulationTimeCondition value="5" rule="greaterThan"/>"#;
     for (old, new, wanted) in [
         (dip, r#"speed="$dip_mps" time="1""#, "{ speed: 2 m/s, rate: 6 m/s^2 }\n  { speed: 2 m/s }"),
-        (dip, r#"speed="$dip_mps" time="0.1""#, "{ speed: 2 m/s, rate: 8 m/s^2 }\n  { speed: 2 m/s }"),
+        (dip, r#"speed="$dip_mps" time="0.1""#, "{ speed: 2 m/s, rate: 15 m/s^2 }\n  { speed: 2 m/s }"),
         (dip, r#"speed="$dip_mps" time="0""#, "{ speed: 2 m/s }\n  { speed: 2 m/s }\n  after 1 s"),
         // The least rate is 0.1 m/s²: 0.5 m/s take 5 s of the 20 s.
         (dip, r#"speed="7.5" time="20""#, "{ speed: 7.5 m/s, rate: 0.1 m/s^2 }\n  after 15 s {"),
@@ -414,7 +414,11 @@ fn conditions_and_words_are_read_or_refused() {
     for (old, new, wanted) in [
         ("value=\"1.5\"", "value=\"-1\"", "less than 0"),
         ("freespace=\"true\"", "freespace=\"perhaps\"", "neither `true` nor `false`"),
-        ("conditionEdge=\"rising\"", "conditionEdge=\"falling\"", "once not npc.rear"),
+        (
+            "conditionEdge=\"rising\"",
+            "conditionEdge=\"falling\"",
+            "once not (npc.rear - ego.front < ego.speed * 1.5 s",
+        ),
         ("conditionEdge=\"rising\"", "conditionEdge=\"upward\"", "it may be none, rising"),
         ("<EntityRef entityRef=\"Ego\"/>", "", "it names no entity"),
         ("selectTriggeringEntities=\"false\"", "selectTriggeringEntities=\"true\"", "a condition selects"),

@@ -305,6 +305,12 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<ActKind> {
 fn profile(source: &mut Source, action: Node) -> Option<Vec<SpeedEntry>> {
     if source.word(action, "followingMode", &FOLLOWING)? != "position" {
         source.note("speeds change evenly, also where the file has a curve");
+        let first = children(action).find(|node| node.has_tag_name("SpeedProfileEntry"));
+        let is_at_once = first
+            .is_some_and(|node| node.attribute("time").is_some_and(|time| time.trim().parse() == Ok(0.0)));
+        let reason =
+            "a profile that is followed begins with the speed that is there: its first time is above 0";
+        source.refuse_if(is_at_once, action, reason)?;
     }
     if action.has_attribute("entityRef") {
         return source.refuse(action, "a profile of speeds that are relative to an entity is not read");

@@ -8,6 +8,9 @@ use avastra_lang::model::vocabulary::BodyField;
 use super::catalogue;
 use super::source::{Source, children, element, elements};
 
+/// A vehicle's middle is not so far behind its rear axle, m.
+const BEHIND_M: f64 = 0.05;
+
 /// Ours: farther from the axle than the longest body is long, m, the middle is a mistake.
 const MIDDLE_M_MAX: f64 = 20.0;
 
@@ -94,6 +97,9 @@ fn of_size(source: &mut Source, node: Node) -> Option<Body> {
     let middle_m = source.number(centre, "x")?;
     let reason = format!("`x` is {middle_m}: more than {MIDDLE_M_MAX} m from the axle");
     source.refuse_if(middle_m.abs() > MIDDLE_M_MAX, centre, reason)?;
+    let reason = format!("its middle is {middle_m} m ahead of its reference point, which is the rear axle");
+    let is_beside = node.has_tag_name("Vehicle") && middle_m < -BEHIND_M;
+    source.refuse_if(is_beside || middle_m.abs() > length_m / 2.0, centre, reason)?;
     let (mut gains_mps2, mut loses_mps2, mut most_mps) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
     if let Some(node) = element(node, "Performance") {
         gains_mps2 = source.amount(node, "maxAcceleration")?;

@@ -5,7 +5,7 @@ use avastra_world::sim::VehicleParameters;
 
 use super::across::LanesBeside;
 use super::action::{ActKind, Speed};
-use super::order::is_aside;
+use super::order::{is_aside, is_speed};
 use super::phases::ARRIVES_M;
 use super::position::Position;
 use super::said::Said;
@@ -381,6 +381,14 @@ impl Waiting<'_, '_> {
         };
         match &act.kind {
             ActKind::Meet(meeting) => {
+                let at_once = event.when.iter().all(|all| all.iter().all(|one| one.kind == When::Always));
+                let later =
+                    moving.entity.events.iter().skip_while(|other| !core::ptr::eq(*other, event)).skip(1);
+                let is_cut = later
+                    .filter(|other| other.acts.iter().any(is_speed) || other.overwrites)
+                    .any(|other| !other.waits_for_the_end_of(event));
+                let reason = format!("whether `{name}` goes on until its place is reached is not known");
+                source.refuse_if(!at_once || is_cut, mark, reason)?;
                 let at_m = moving.reach_m(source, self.cast, &meeting.own_at)?;
                 Some(Said::text(format!("{who}.station >= ")).number(at_m, "m"))
             }

@@ -117,8 +117,9 @@ impl<'e> Sequence<'e> {
             source.refuse_if(is_cut, &event.mark, reason)?;
             return Some(());
         }
-        let has_come = |when: &When| {
-            self.time_s(when).zip(later.least_s).is_some_and(|(came_s, least_s)| came_s <= least_s)
+        let has_come = |one: &Condition| {
+            let came_s = self.time_s(&one.kind).map(|came_s| came_s + one.delay_s);
+            came_s.zip(later.least_s).is_some_and(|(came_s, least_s)| came_s <= least_s)
         };
         if before.when.is_empty()
             || event.waits_for(before)
@@ -238,6 +239,9 @@ impl<'e> Sequence<'e> {
         let mut field = None;
         for other in self.under_way(event) {
             let is_cut = event.overwrites && event.is_beside(other);
+            let follows = other.acts.iter().any(|act| matches!(act.kind, ActKind::Follow(_)));
+            let reason = "a trajectory may be under way, which it would end, or lead beside: what waits for its end is read";
+            source.refuse_if(follows && (is_cut || event.acts.iter().any(is_aside)), &event.mark, reason)?;
             for act in other.acts.iter().filter(|act| takes_time(act)) {
                 let says_the_same = event.acts.iter().any(|own| is_aside(own) && is_aside(act));
                 let reason = "it begins while another move to the side may be under way: where that has come to by then is not known";
@@ -263,7 +267,7 @@ impl Event {
         })
     }
 
-    fn waits_for_the_end_of(&self, other: &Event) -> bool {
+    pub fn waits_for_the_end_of(&self, other: &Event) -> bool {
         self.waits_in_all(|when| matches!(when, When::Ended { kind, name } if is_called(other, kind, name)))
     }
 
@@ -300,7 +304,8 @@ pub fn is_aside(act: &Act) -> bool {
     matches!(act.kind, ActKind::Lane(..) | ActKind::Offset(..))
 }
 
-fn is_speed(act: &Act) -> bool {
+/// Whether something says a speed.
+pub fn is_speed(act: &Act) -> bool {
     matches!(act.kind, ActKind::Speed(..) | ActKind::Profile(_) | ActKind::Meet(_) | ActKind::Keep(_))
 }
 
@@ -354,12 +359,11 @@ fn takes_s(act: &Act, mps: &mut Option<f64>) -> Option<f64> {
 
 /// Whether what one trigger waits for holds only once what another one waits for has held: in one of its groups the same of the same
 /// two, less far on, and what has come by then.
-fn is_implied(before: &Trigger, then: &Trigger, has_come: impl Fn(&When) -> bool) -> bool {
+fn is_implied(before: &Trigger, then: &Trigger, has_come: impl Fn(&Condition) -> bool) -> bool {
     let [all] = then.as_slice() else { return false };
     let then: Vec<&Condition> = all.iter().filter(|one| one.kind != When::Always).collect();
     let [then] = then.as_slice() else { return false };
-    let is_before =
-        |one: &Condition| one.kind == When::Always || has_come(&one.kind) || is_farther_on(one, then);
+    let is_before = |one: &Condition| one.kind == When::Always || has_come(one) || is_farther_on(one, then);
     before.iter().any(|all| all.iter().all(is_before))
 }
 
@@ -419,6 +423,15 @@ impl Waiting<'_, '_> {
             let reason = format!("several do `{name}`: when all of them have begun or ended it is not read");
             source.refuse_if(self.cast.moving.iter().filter(does).count() > 1, &condition.mark, reason)?;
             self.is_one_moment(source, condition, kind, name)?;
+            let waits = |own: &&Event| own.when.iter().flatten().any(|one| one.mark == condition.mark);
+            let is_within =
+                self.actor.entity.events.iter().filter(waits).any(|own| is_called(own, kind, name));
+            let reason = format!("it waits for `{name}`, of which it is a part");
+            source.refuse_if(is_within, &condition.mark, reason)?;
+            let ends = matches!(condition.kind, When::Ended { .. });
+            let reason =
+                format!("`{name}` happens several times, and when the last time has ended is not read");
+            source.refuse_if(ends && of.is_some_and(|of| of.comes_again), &condition.mark, reason)?;
             let reason = format!("it waits for `{name}`, and that, by way of others, for itself");
             source.refuse_if(self.cast.waits_for_itself(kind, name), &condition.mark, reason)?;
         }

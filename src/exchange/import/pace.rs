@@ -51,13 +51,8 @@ pub fn too_fast(mps: f64) -> String {
     format!("{mps:.1} m/s: nothing is faster than {} m/s", SPAWN_SPEED_MPS.end())
 }
 
-/// A rate of a speed that the vehicle can keep to, as a player does, and an order may have, m/s².
-pub fn rate_within_mps2(source: &mut Source, body: &Body, change: Change, rate_mps2: f64) -> f64 {
-    let most_mps2 = match change {
-        Change::Up => body.gains_mps2,
-        Change::Down => body.loses_mps2,
-        Change::Unknown => f64::INFINITY,
-    };
+/// A rate of a speed of at most so much, as a player keeps to what a vehicle can, and as an order may have, m/s².
+pub fn rate_within_mps2(source: &mut Source, most_mps2: f64, rate_mps2: f64) -> f64 {
     let (least, most) = (*RATE_MPS2.start(), *RATE_MPS2.end());
     let within = rate_mps2.clamp(least, most_mps2.clamp(least, most));
     if rate_mps2 > within {
@@ -118,6 +113,17 @@ impl<'a> Cast<'a> {
                 (Said::text(format!("{}.speed * ", who(source, name)?)).number(*times, ""), None)
             }
         };
+        let most_mps = moving.entity.body.most_mps;
+        if let Speed::More(name, _) | Speed::Times(name, _) = wanted {
+            let of_mps = self.begins_mps(source, mark, name)?;
+            let begins_mps = match wanted {
+                Speed::Times(_, times) => of_mps * times,
+                Speed::More(_, more_mps) => of_mps + more_mps,
+                Speed::Absolute(mps) => *mps,
+            };
+            let reason = format!("{begins_mps:.1} m/s as they begin: its `maxSpeed` is {most_mps} m/s");
+            source.refuse_if(begins_mps > most_mps, mark, reason)?;
+        }
         if let Some(mps) = mps {
             source.refuse_if(mps < 0.0, mark, "nobody drives backwards")?;
             source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), mark, too_fast(mps))?;
@@ -164,12 +170,35 @@ impl<'a> Cast<'a> {
             }
         };
         let change = Change::between(told.mps, mps);
+        let Body { gains_mps2, loses_mps2, .. } = moving.entity.body;
         let rate = rate.map(|rate| match rate.0.as_slice() {
             [Piece::Number(figure)] => {
-                let within = rate_within_mps2(source, &moving.entity.body, change, figure.value());
-                Said::default().number(within, "m/s^2")
+                // The peak of a curve is what a vehicle must be able to.
+                let mut within = |most_mps2: f64| {
+                    let mps2 = rate_within_mps2(source, most_mps2 / dynamics.peak, figure.value());
+                    Said::default().number(mps2, "m/s^2")
+                };
+                match change {
+                    Change::Up => within(gains_mps2),
+                    Change::Down => within(loses_mps2),
+                    Change::Unknown if figure.value() * dynamics.peak <= gains_mps2.min(loses_mps2) => {
+                        within(f64::INFINITY)
+                    }
+                    Change::Unknown => Said::text("match npc.speed <= ")
+                        .then(said.clone())
+                        .and(" { true => ")
+                        .then(within(gains_mps2))
+                        .and(", false => ")
+                        .then(within(loses_mps2))
+                        .and(" }"),
+                }
             }
-            _ => rate,
+            _ => {
+                source.note(
+                    "a change in a time from a speed that the file does not say is as fast as that takes, whatever its vehicle can",
+                );
+                rate
+            }
         });
         told.mps = mps;
         instead_of(fields, &PACE);
@@ -193,7 +222,13 @@ impl<'a> Cast<'a> {
         kept: &Kept,
     ) -> Option<Vec<Said>> {
         let (of, too_far) = self.too_far(source, moving, mark, kept)?;
-        let said = match kept.bounds {
+        let Body { gains_mps2, loses_mps2, most_mps, .. } = moving.entity.body;
+        let bounds = kept.bounds.map(|own| Bounds {
+            gains_mps2: own.gains_mps2.min(gains_mps2),
+            loses_mps2: own.loses_mps2.min(loses_mps2),
+            speed_mps_max: own.speed_mps_max.min(most_mps),
+        });
+        let said = match bounds {
             None => {
                 source.note("a distance without bounds is taken at 70 m/s at most, backwards at 10 m/s");
                 Said::text(format!("{of}.speed + (")).then(too_far).and(") / 20 ms")
@@ -307,6 +342,7 @@ impl<'a> Cast<'a> {
             Some(Speed::More(_, more)) => Some(speed(source, self.story, &self.story.ego, 0)? + more),
             Some(Speed::Times(_, times)) => Some(speed(source, self.story, &self.story.ego, 0)? * times),
         };
+        source.note("who arrives with the ego vehicle comes to its place by another course of speeds than in the file's player");
         if let Some(mps) = mps {
             source.refuse_if(mps <= 0.0, mark, "it arrives with a speed above 0")?;
             source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), mark, too_fast(mps))?;
@@ -332,7 +368,6 @@ impl<'a> Cast<'a> {
 pub fn profile(
     source: &mut Source,
     mark: &Mark,
-    body: &Body,
     from_mps: Option<f64>,
     entries: &[SpeedEntry],
     begins: Said,
@@ -349,8 +384,8 @@ pub fn profile(
             };
             let by_mps = (mps - from_mps).abs();
             if by_mps > 0.0 {
-                let change = Change::between(from, Some(*mps));
-                let rate_mps2 = rate_within_mps2(source, body, change, by_mps / time_s);
+                // Its times say how fast, whatever its vehicle can.
+                let rate_mps2 = rate_within_mps2(source, f64::INFINITY, by_mps / time_s);
                 said = said.and(", rate: ").number(rate_mps2, "m/s^2");
                 // One whose vehicle is slower takes longer.
                 rest_s = (time_s - by_mps / rate_mps2).max(0.0);

@@ -6,12 +6,13 @@ use avastra_road::LanePlace;
 use super::across::aside_fields;
 use super::action::{Act, ActKind, Aside, Speed};
 use super::condition::Waiting;
-use super::order::is_aside;
+use super::order::{is_aside, is_speed};
 use super::pace::{self, PACE, too_fast};
 use super::said::Said;
 use super::scene::{Cast, Moving};
 use super::source::Source;
 use super::story::Event;
+use super::trigger::{Condition, Edge};
 use super::ways::Leg;
 
 /// A distance that is to be reached is, this near to it, m, as for esmini.
@@ -103,7 +104,8 @@ impl<'a> Cast<'a> {
                     Said::default()
                 }
                 Some(event) => {
-                    let is_first = matches!(event.when.as_slice(), [all] if all.len() == 1)
+                    let rises = |one: &Condition| matches!(one.edge, Edge::None | Edge::Rising);
+                    let is_first = matches!(event.when.as_slice(), [all] if all.len() == 1 && all.iter().all(rises))
                         && before.iter().all(|event| event.when.is_empty());
                     let waiting = Waiting { cast: self, actor: moving, before: before.clone(), is_first };
                     let begins = waiting.begins(source, &event.when)?;
@@ -149,6 +151,14 @@ impl<'a> Cast<'a> {
             let mut aside = acts.iter().filter(|act| is_aside(act));
             if let (Some(_), Some(second)) = (aside.next(), aside.next()) {
                 return source.refuse(&second.mark, "another move to the side begins at the same moment");
+            }
+            let mut speeds = acts.iter().filter(|act| matches!(act.kind, ActKind::Speed(..)));
+            if let (Some(_), Some(second)) = (speeds.next(), speeds.next()) {
+                return source.refuse(&second.mark, "another speed is told at the same moment");
+            }
+            if let Some(act) = acts.iter().find(|act| is_aside(act)) {
+                let stands = told.mps == Some(0.0) && !acts.iter().any(|act| is_speed(act));
+                source.refuse_if(stands, &act.mark, "it stands, and nobody slides aside here")?;
             }
             let mut timed = Vec::new();
             let mut own: Option<Takes> = None;
@@ -197,8 +207,7 @@ impl<'a> Cast<'a> {
                         source.refuse_if(has_times, &act.mark, reason)?;
                         let begins = begins.clone();
                         let then;
-                        (timed, then) =
-                            pace::profile(source, &act.mark, &entity.body, told.mps, entries, begins)?;
+                        (timed, then) = pace::profile(source, &act.mark, told.mps, entries, begins)?;
                         Takes::add(&mut own, then, false);
                         told.mps = entries.last().map(|entry| entry.mps);
                     }

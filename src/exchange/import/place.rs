@@ -15,6 +15,9 @@ use super::story::Story;
 /// Who looks along a lane within this angle drives along it, rad: a player's drivers keep their lanes.
 const ALONG_RAD: f64 = 0.3;
 
+/// Who stands within this angle to a lane stands along it, rad.
+const STANDS_RAD: f64 = 0.02;
+
 /// A way that is laid along lanes is followed this far, m.
 const WAY_M_MAX: f64 = 12_000.0;
 
@@ -333,11 +336,11 @@ impl<'a> Places<'a> {
                     let key = &self.map.lane(here.lane).key;
                     let s_m = self.map.lane(here.lane).road_station_m(here.station_m);
                     let reference = self.reference(source, mark, &key.road.clone(), s_m)?;
-                    let lane = self.map.lane(here.lane);
-                    let turn_rad = if lane.is_along() { 0.0 } else { PI };
-                    let along =
-                        Pose { heading_rad: wrap_angle(reference.heading_rad + turn_rad), ..reference };
-                    Some(self.in_plane(along.offset(0.0, t_m)))
+                    // To the left of the road, and along the route.
+                    let there = reference.offset(0.0, t_m);
+                    let turn_rad = if self.map.lane(here.lane).is_along() { 0.0 } else { PI };
+                    let heading_rad = wrap_angle(there.heading_rad + turn_rad);
+                    Some(self.in_plane(Pose { heading_rad, ..there }))
                 }
             };
         }
@@ -347,17 +350,24 @@ impl<'a> Places<'a> {
     /// The lane of an id beside a place.
     fn lane_of_road(&self, here: LanePlace, id: i32) -> Option<LanePlace> {
         let lane = self.map.lane(here.lane);
-        if lane.key.lane == id || lane.junction.is_some() {
+        if lane.key.lane == id {
             return Some(here);
         }
-        self.map.place(&lane.key.road, id, lane.road_station_m(here.station_m)).ok()
+        let there = self.map.place(&lane.key.road, id, lane.road_station_m(here.station_m)).ok();
+        // Roads in junctions have the lanes of one direction only, with numbers of their own.
+        there.or_else(|| lane.junction.map(|_| here))
     }
 }
 
 impl Placed {
-    /// Whether it stands along its lane.
+    /// Whether somebody who drives from there drives along its lane.
     pub fn is_along(&self) -> bool {
         self.lane.is_some() && self.turned_rad.abs() < ALONG_RAD
+    }
+
+    /// Whether somebody stands there as its lane leads.
+    pub fn stands_along(&self) -> bool {
+        self.lane.is_some() && self.turned_rad.abs() < STANDS_RAD
     }
 
     /// Whether it looks against its lane.

@@ -135,7 +135,7 @@ impl Scene {
         };
         let ego_mps = speed(source, story, &story.ego, 0)?;
         source.note(
-            "the ego vehicle is avastra's own: 4.70 m long, with its rear axle where the file's has its own",
+            "the ego vehicle is avastra's own: 4.70 m long and 2.06 m wide, with its rear axle where the file's has its own",
         );
         let mut cast = Cast { story, map, route, places: RefCell::new(places), moving: Vec::new() };
         for entity in &story.others {
@@ -452,8 +452,11 @@ impl<'a> Cast<'a> {
             return Some(moving(Rc::new(Path::through(&points)?), points_text(&points), 0.0, 0.0));
         }
         let is_short = mps == 0.0 && !entity.events.iter().any(moves);
-        if let Some(lane) = placed.lane.filter(|lane| placed.is_along() && OFFSET_M.contains(&lane.offset_m))
-        {
+        let looks_along = if is_short { placed.stands_along() } else { placed.is_along() };
+        if looks_along && !placed.stands_along() {
+            source.note(format!("`{}` looks along its lane from the beginning", entity.name));
+        }
+        if let Some(lane) = placed.lane.filter(|lane| looks_along && OFFSET_M.contains(&lane.offset_m)) {
             let begin_m = (lane.station_m / BEGINS_M).floor() * BEGINS_M;
             let begin = LanePlace { lane: lane.lane, station_m: begin_m, offset_m: 0.0 };
             let mut ways = vec![begin];
@@ -596,5 +599,7 @@ pub fn speed(source: &mut Source, story: &Story, entity: &Entity, depth: usize) 
     };
     source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), mark, too_fast(mps))?;
     source.refuse_if(mps < 0.0, mark, "no vehicle drives backwards")?;
+    let most_mps = entity.body.most_mps;
+    source.refuse_if(mps > most_mps, mark, format!("{mps} m/s: its `maxSpeed` is {most_mps} m/s"))?;
     Some(mps)
 }

@@ -153,7 +153,7 @@ mod tests {
     }
 
     fn change(at_s: f64, weather: Weather) -> Change {
-        Change { mark: Mark { line: 1, element: String::new() }, at_s, weather }
+        Change { mark: Mark { line: 1, element: String::new(), at: 0 }, at_s, weather }
     }
 
     #[test]

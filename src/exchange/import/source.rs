@@ -33,6 +33,8 @@ const NUMBER_MAX: f64 = 1e7;
 pub struct Mark {
     pub line: u32,
     pub element: String,
+    /// Where it begins in its own file: elements of a catalogue all have the line of what refers to it.
+    pub at: usize,
 }
 
 /// What can be refused: an element, or the mark of one.
@@ -120,10 +122,9 @@ impl<'f> Source<'f> {
     /// Where an element stands.
     pub fn mark(&self, node: Node) -> Mark {
         let element = node.tag_name().name().to_owned();
-        match &self.outermost {
-            Some((line, _)) => Mark { line: *line, element },
-            None => Mark { line: self.lines.of(node.range().start), element },
-        }
+        let at = node.range().start;
+        let line = self.outermost.as_ref().map_or_else(|| self.lines.of(at), |(line, _)| *line);
+        Mark { line, element, at }
     }
 
     /// Reads within an entry of a catalogue, of which messages name the reference to it.
@@ -219,7 +220,7 @@ impl<'f> Source<'f> {
     pub fn refuse<T>(&mut self, at: impl Marked, reason: impl Into<String>) -> Option<T> {
         self.told += 1;
         if self.refused.len() < REFUSALS_MAX {
-            let Mark { line, element } = at.mark(self);
+            let Mark { line, element, .. } = at.mark(self);
             let reason = match &self.outermost {
                 Some((_, whose)) => format!("{whose}: {}", reason.into()),
                 None => reason.into(),

@@ -75,13 +75,15 @@ pub struct Event {
     pub acts: Vec<Act>,
     /// Whether its beginning ends what else of its manoeuvre is under way.
     pub overwrites: bool,
+    /// Whether the file lets it happen several times.
+    pub comes_again: bool,
 }
 
 impl Event {
     /// What somebody does from the beginning.
     fn of_init(mark: Mark, kind: ActKind) -> Event {
         let acts = vec![Act { mark: mark.clone(), kind }];
-        Event { mark, names: Vec::new(), when: Vec::new(), acts, overwrites: false }
+        Event { mark, names: Vec::new(), when: Vec::new(), acts, overwrites: false, comes_again: false }
     }
 
     pub fn name(&self) -> &str {
@@ -426,9 +428,10 @@ impl Cast {
                         source.refuse::<()>(event, reason);
                         return;
                     }
+                    let comes_again = [event, scope.group].into_iter().any(comes_again);
                     let overwrites = matches!(priority, Some("override" | "overwrite"));
                     let (names, when) = (names.clone(), when.clone());
-                    entity.events.push(Event { mark, names, when, acts, overwrites });
+                    entity.events.push(Event { mark, names, when, acts, overwrites, comes_again });
                 }
             }
         }
@@ -637,6 +640,11 @@ fn is_carried_out(source: &mut Source, node: Node) -> bool {
         }
         count => count.is_some(),
     }
+}
+
+/// Whether something may happen more than once.
+fn comes_again(node: Node) -> bool {
+    node.attribute("maximumExecutionCount").is_some_and(|count| count.trim() != "1")
 }
 
 /// When the scenario ends: at the first of the times that its stop trigger names, each with what must come beside it, or when the ego
