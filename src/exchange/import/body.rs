@@ -97,9 +97,11 @@ fn of_size(source: &mut Source, node: Node) -> Option<Body> {
     let middle_m = source.number(centre, "x")?;
     let reason = format!("`x` is {middle_m}: more than {MIDDLE_M_MAX} m from the axle");
     source.refuse_if(middle_m.abs() > MIDDLE_M_MAX, centre, reason)?;
-    let reason = format!("its middle is {middle_m} m ahead of its reference point, which is the rear axle");
-    let is_beside = node.has_tag_name("Vehicle") && middle_m < -BEHIND_M;
-    source.refuse_if(is_beside || middle_m.abs() > length_m / 2.0, centre, reason)?;
+    let reason = format!(
+        "`x` is {middle_m}: the reference point, of vehicles the rear axle, lies within the body and no vehicle's middle behind it"
+    );
+    let is_behind = node.has_tag_name("Vehicle") && middle_m < -BEHIND_M;
+    source.refuse_if(is_behind || middle_m.abs() > length_m / 2.0, centre, reason)?;
     let (mut gains_mps2, mut loses_mps2, mut most_mps) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
     if let Some(node) = element(node, "Performance") {
         gains_mps2 = source.amount(node, "maxAcceleration")?;

@@ -7,7 +7,6 @@ use super::across::LanesBeside;
 use super::action::{ActKind, Speed};
 use super::order::{is_aside, is_speed};
 use super::phases::ARRIVES_M;
-use super::position::Position;
 use super::said::Said;
 use super::scene::{Cast, Moving};
 use super::source::{Mark, Source};
@@ -195,13 +194,18 @@ impl Waiting<'_, '_> {
                 self.is_along(source, mark, pair, None)?;
                 self.meet_along(source, mark, pair)?;
                 let way = self.nearer(source, mark, pair)?;
-                let (of, to) = (self.who(source, mark, &pair.of)?, self.who(source, mark, &pair.to)?);
-                let (back, front) = if self.is_behind(source, mark, pair)? { (of, to) } else { (to, of) };
-                let sign = if self.face_each_other(source, mark, pair)? { "+" } else { "-" };
-                let said = way
-                    .clone()
-                    .and(format!(" < ({back}.speed {sign} {front}.speed) * "))
-                    .number(*seconds, "s");
+                let is_behind = self.is_behind(source, mark, pair)?;
+                let (back, front) = if is_behind { (&pair.of, &pair.to) } else { (&pair.to, &pair.of) };
+                let looks = [back, front].map(|name| self.cast.looks_ahead(source, mark, name));
+                let looks = (looks[0]?, looks[1]?);
+                let (back, front) = (self.who(source, mark, back)?, self.who(source, mark, front)?);
+                let closing = match looks {
+                    (true, true) => format!("{back}.speed - {front}.speed"),
+                    (true, false) => format!("{back}.speed + {front}.speed"),
+                    (false, false) => format!("{front}.speed - {back}.speed"),
+                    (false, true) => return source.refuse(mark, "the two drive away from each other"),
+                };
+                let said = way.clone().and(format!(" < ({closing}) * ")).number(*seconds, "s");
                 // Who has passed the other one comes no nearer.
                 Some(if self.is_first {
                     said
@@ -230,7 +234,7 @@ impl Waiting<'_, '_> {
             }
             When::Clear(room) => self.clear(source, mark, room),
             When::Reaches { entity, position, within_m, is_less } => {
-                self.stays(source, &position.0)?;
+                self.cast.stays(source, &position.0)?;
                 self.stays_beside(source, condition, entity)?;
                 let point = self.cast.place(source, &position.0)?.pose.position;
                 let (said, station_m) = self.station(source, mark, entity, point)?;
@@ -271,7 +275,7 @@ impl Waiting<'_, '_> {
                 Some(Said::text(format!("{of}.speed - {to}.speed {} ", rule.sign())).number(*mps, "m/s"))
             }
             When::Nears { entity, position, seconds, is_free_space } => {
-                self.stays(source, &position.0)?;
+                self.cast.stays(source, &position.0)?;
                 let point = self.cast.place(source, &position.0)?.pose.position;
                 let (said, station_m) = self.station(source, mark, entity, point)?;
                 let station_m = station_m - if *is_free_space { self.cast.front_m(entity) } else { 0.0 };
@@ -462,10 +466,8 @@ impl Waiting<'_, '_> {
             );
             return Some(());
         }
-        let [of, to] = [&pair.of, &pair.to].map(|name| self.cast.begins(source, mark, name));
-        let offset_m = |point: Vec2| self.cast.route.path.project(point).offset_m;
         let outlines_m = if pair.is_free_space { self.cast.half_widths_m(pair) } else { 0.0 };
-        let aside_m = ((offset_m(of?) - offset_m(to?)).abs() - outlines_m).max(0.0);
+        let aside_m = (self.apart_m(source, mark, pair)? - outlines_m).max(0.0);
         let is_short = |bound_m: f64| {
             aside_m > bound_m || bound_m - (bound_m * bound_m - aside_m * aside_m).sqrt() > ASIDE_M
         };
@@ -493,11 +495,6 @@ impl Waiting<'_, '_> {
             && (self.away_m(source, mark, pair)? - bound_m).abs() < JUST_M
             && self.closes_mps(source, mark, pair)? == 0.0;
         source.refuse_if(is_just, mark, AT_ITS_BOUND)
-    }
-
-    /// Refuses a place beside somebody who may be elsewhere by then.
-    fn stays(&self, source: &mut Source, place: &Position) -> Option<()> {
-        self.cast.stays(source, place)
     }
 
     /// Refuses to ask for a place of somebody who moves aside on the way there: the place counts across, too.

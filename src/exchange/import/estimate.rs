@@ -67,9 +67,10 @@ impl Waiting<'_, '_> {
                 let ahead_m = self.ahead_m(source, mark, entity, position)?;
                 (ahead_m.abs() <= *within_m) == *is_less
             }
-            When::Nears { entity, position, seconds, .. } => {
+            When::Nears { entity, position, seconds, is_free_space } => {
                 let way_m = self.cast.begins_mps(source, mark, entity)? * seconds;
-                self.ahead_m(source, mark, entity, position)? <= way_m
+                let front_m = if *is_free_space { self.cast.front_m(entity) } else { 0.0 };
+                self.ahead_m(source, mark, entity, position)? - front_m <= way_m
             }
             When::Travelled { metres, .. } => *metres <= 0.0,
             When::Always => true,
@@ -171,7 +172,8 @@ impl Waiting<'_, '_> {
         let actor = &self.actor.entity.name;
         let other = if pair.of == *actor { &pair.to } else { &pair.of };
         let is_own = (pair.of == *actor) != (pair.to == *actor);
-        if !is_own || self.face_each_other(source, mark, pair)? {
+        let along = |source: &mut Source, name: &str| self.cast.looks_ahead(source, mark, name);
+        if !is_own || !along(source, &pair.of)? || !along(source, &pair.to)? {
             return None;
         }
         let other_mps = self.cast.begins_mps(source, mark, other)?;
@@ -195,15 +197,17 @@ impl Waiting<'_, '_> {
         (way_m > 0.0 && mps > 0.0).then(|| way_m / mps)
     }
 
-    /// How fast two come nearer to each other as they begin, m/s.
+    /// How fast two come nearer to each other as they begin, m/s; below 0 they part.
     pub fn closes_mps(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<f64> {
-        let of_mps = self.cast.begins_mps(source, mark, &pair.of)?;
-        let to_mps = self.cast.begins_mps(source, mark, &pair.to)?;
-        Some(match self.is_behind(source, mark, pair)? {
-            _ if self.face_each_other(source, mark, pair)? => of_mps + to_mps,
-            true => of_mps - to_mps,
-            false => to_mps - of_mps,
-        })
+        let (of_mps, to_mps) =
+            (self.along_mps(source, mark, &pair.of)?, self.along_mps(source, mark, &pair.to)?);
+        Some(if self.is_behind(source, mark, pair)? { of_mps - to_mps } else { to_mps - of_mps })
+    }
+
+    /// How fast somebody begins along the ego vehicle's route, m/s; below 0 against it.
+    fn along_mps(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<f64> {
+        let mps = self.cast.begins_mps(source, mark, name)?;
+        Some(if self.cast.looks_ahead(source, mark, name)? { mps } else { -mps })
     }
 
     /// How far a place is ahead of somebody at the beginning, m.
@@ -212,12 +216,6 @@ impl Waiting<'_, '_> {
         let begins = self.cast.begins(source, mark, entity)?;
         let (_, station_m) = self.station(source, mark, entity, point)?;
         Some(station_m - self.station(source, mark, entity, begins)?.1)
-    }
-
-    /// Whether two look against each other as they begin.
-    pub fn face_each_other(&self, source: &mut Source, mark: &Mark, pair: &Pair) -> Option<bool> {
-        let [of, to] = [&pair.of, &pair.to].map(|name| self.cast.looks_ahead(source, mark, name));
-        Some(of? != to?)
     }
 
     /// How far two are from each other across the ego vehicle's route at the beginning, m.

@@ -3,6 +3,7 @@
 //! A manoeuvre goes from phase to phase, and asks what is so now; a file's events come side by side, and remember.
 
 use super::action::{Act, ActKind, Over, Speed};
+use super::body::Body;
 use super::condition::{Waiting, is_called};
 use super::phases::same_moment;
 use super::said::Said;
@@ -11,8 +12,8 @@ use super::source::{Mark, Source};
 use super::story::Event;
 use super::trigger::{Condition, Edge, Pair, PlaceMark, Rule, Trigger, When};
 
-/// What is estimated to come so much later is later, s.
-const LATER_S: f64 = 0.1;
+/// What is estimated to come at most this much before what stands above it still counts as coming after it, s.
+const EARLY_S_MAX: f64 = 0.1;
 
 /// Times that differ by less are the same, s.
 const LEAST_S: f64 = 1e-6;
@@ -73,7 +74,7 @@ impl<'a> Cast<'a> {
                 ActKind::Speed(Speed::Absolute(to_mps), _) => mps == Some(*to_mps) && takes_time(act),
                 _ => false,
             });
-            let takes_s = event.acts.iter().map(|act| takes_s(act, &mut mps));
+            let takes_s = event.acts.iter().map(|act| takes_s(act, &moving.entity.body, &mut mps));
             let takes_s =
                 takes_s.collect::<Option<Vec<f64>>>().map(|all| all.into_iter().fold(0.0, f64::max));
             let ends_s = match event.acts.as_slice() {
@@ -87,7 +88,7 @@ impl<'a> Cast<'a> {
                 told_mps.and_then(|told_mps| waiting.takes_at_least_s(source, &event.when, told_mps));
             // As they begin it never comes: what stands directly before it changes that.
             let is_made_to_come = estimate_s == Some(f64::INFINITY)
-                && changes.is_none_or(|(changer, _)| changer + 1 == sequence.events.len());
+                && changes.is_some_and(|(changer, _)| changer + 1 == sequence.events.len());
             let later_s = later_s.filter(|_| is_made_to_come).unwrap_or(0.0);
             if changes.is_none() && event.acts.iter().any(is_speed) {
                 changes = Some((sequence.events.len(), least_s.unwrap_or(0.0)));
@@ -129,8 +130,11 @@ impl<'e> Sequence<'e> {
         }
         // The driving system may bring about another order.
         let note = format!("what `{}` does is taken to come in the order of the file", moving.entity.name);
+        let other = before.name();
         let reason = match (earlier.comes_s, later.least_s) {
-            (Some(earlier_s), Some(later_s)) if earlier_s.is_finite() && later_s >= earlier_s - LATER_S => {
+            (Some(earlier_s), Some(later_s))
+                if earlier_s.is_finite() && later_s >= earlier_s - EARLY_S_MAX =>
+            {
                 if before.time_s().is_none() || event.time_s().is_none() {
                     source.note(note);
                 }
@@ -141,14 +145,11 @@ impl<'e> Sequence<'e> {
                 return Some(());
             }
             (Some(earlier_s), Some(later_s)) if earlier_s.is_finite() => format!(
-                "as they begin, it comes at {later_s:.1} s, and what stands before it at {earlier_s:.1} s: what one does is read in the order in which it comes"
+                "as they begin, it comes at {later_s:.1} s, and `{other}`, which stands before it, at {earlier_s:.1} s: what one does is read in the order in which it comes"
             ),
-            _ => {
-                let other = before.name();
-                format!(
-                    "whether it comes after `{other}` is not known, and what one does is read in the order in which it comes"
-                )
-            }
+            _ => format!(
+                "whether it comes after `{other}` is not known, and what one does is read in the order in which it comes: let it wait for the end of that"
+            ),
         };
         source.refuse(&event.mark, reason)
     }
@@ -177,15 +178,17 @@ impl<'e> Sequence<'e> {
         let before: Vec<&(&Event, Times)> = self.events.iter().take(at).collect();
         let is_over = |(other, times): &(&Event, Times)| {
             // What waits for the end of what waits for its end comes later still.
-            let mut ended = vec![event];
+            let (mut ended, mut seen): (Vec<&Event>, Vec<&Event>) = (vec![event], Vec::new());
             while let Some(last) = ended.pop() {
                 if last.waits_for_the_end_of(other) {
                     return true;
                 }
-                let earlier = self.events.iter().map(|(own, _)| *own);
-                ended.extend(
-                    earlier.take_while(|own| !core::ptr::eq(*own, last)).filter(|own| last.waits_for(own)),
-                );
+                for (own, _) in self.events.iter().filter(|(own, _)| last.waits_for(own)) {
+                    if !seen.iter().any(|known| core::ptr::eq(*known, *own)) {
+                        seen.push(own);
+                        ended.push(own);
+                    }
+                }
             }
             times.takes_s.is_some_and(|takes_s| takes_s <= later_s + LEAST_S)
                 || times
@@ -206,8 +209,8 @@ impl<'e> Sequence<'e> {
         self.under_way(event).any(|other| other.acts.iter().any(|act| is_speed(act) && takes_time(act)))
     }
 
-    /// Refuses to wait for the end of a move to the side that goes on for a way, of one whose speed may change on it.
-    pub fn ends_as_it_begins(&self, source: &mut Source, event: &Event) -> Option<()> {
+    /// Refuses to wait for ends that come at another time here: of idle changes of speed, of steps to the side, and of moves over a way.
+    pub fn waits_for_known_ends(&self, source: &mut Source, event: &Event) -> Option<()> {
         let of_way = |act: &Act| match &act.kind {
             ActKind::Lane(_, _, dynamics) | ActKind::Offset(_, dynamics) => {
                 matches!(dynamics.over, Over::Way(_))
@@ -234,7 +237,8 @@ impl<'e> Sequence<'e> {
         Some(())
     }
 
-    /// The field that ends a speed which an event overwrites and says nothing of. To the side nothing may be under way.
+    /// Refuses an event that may meet a move to the side, or a trajectory, under way. The field that ends a change of speed which the
+    /// event overwrites without a speed of its own.
     pub fn ends_what_goes_on(&self, source: &mut Source, event: &Event) -> Option<Option<Said>> {
         let mut field = None;
         for other in self.under_way(event) {
@@ -321,20 +325,26 @@ fn takes_time(act: &Act) -> bool {
 }
 
 /// How long something takes, s, of one that has a speed before it, and then the one that it is told.
-fn takes_s(act: &Act, mps: &mut Option<f64>) -> Option<f64> {
+fn takes_s(act: &Act, body: &Body, mps: &mut Option<f64>) -> Option<f64> {
     let dynamics = match &act.kind {
         ActKind::Speed(wanted, dynamics) => {
             let from_mps = mps.take();
             if let Speed::Absolute(to_mps) = wanted {
                 *mps = Some(*to_mps);
                 let over_mps = from_mps.map(|from_mps| (to_mps - from_mps).abs());
-                return match dynamics.over {
-                    Over::AtOnce => Some(0.0),
+                let takes_s = match dynamics.over {
+                    Over::AtOnce => return Some(0.0),
                     Over::Time(time_s) => Some(time_s),
                     Over::Rate(rate_mps2) => Some(over_mps? * dynamics.peak / rate_mps2.abs()),
                     Over::Way(way_m) => Some(2.0 * way_m / (from_mps? + to_mps)),
                     Over::Never => None,
                 };
+                // Its vehicle may need longer.
+                let gains = from_mps.is_none_or(|from_mps| from_mps < *to_mps);
+                let can_mps2 = if gains { body.gains_mps2 } else { body.loses_mps2 };
+                return takes_s.map(|takes_s| {
+                    takes_s.max(over_mps.map_or(0.0, |over_mps| over_mps * dynamics.peak / can_mps2))
+                });
             }
             dynamics
         }
@@ -499,13 +509,8 @@ impl Waiting<'_, '_> {
         for other in later
             .filter(|other| other.acts.iter().any(is_speed) || other.overwrites && other.is_beside(event))
         {
-            let follows = |condition: &Condition| match &condition.kind {
-                When::Ended { kind, name } => is_called(event, kind, name),
-                _ => false,
-            };
-            let waits = other.when.iter().all(|all| all.iter().any(follows));
             let reason = "another event may cut this short, and end it without its speed";
-            source.refuse_if(!waits || other.when.is_empty(), mark, reason)?;
+            source.refuse_if(!other.waits_for_the_end_of(event), mark, reason)?;
         }
         Some(())
     }

@@ -3,11 +3,10 @@
 use avastra_lang::model::SPAWN_SPEED_MPS;
 use avastra_lang::model::command::RATE_MPS2;
 
-use super::action::{
-    Act, ActKind, Bounds, Dynamics, Headway, Kept, Meeting, Over, Speed, SpeedEntry, Steady,
-};
+use super::action::{Bounds, Dynamics, Headway, Kept, Meeting, Over, Speed, SpeedEntry, Steady};
 use super::body::Body;
 use super::condition::Waiting;
+use super::order::is_speed;
 use super::phases::{CONTINUOUS, Told, instead_of};
 use super::said::{Piece, Said};
 use super::scene::{Cast, Moving, speed};
@@ -303,12 +302,9 @@ impl<'a> Cast<'a> {
 
     /// Whether somebody beside the ego vehicle drives at one speed from the beginning on.
     fn keeps_its_speed(&self, name: &str) -> bool {
-        let changes = |act: &Act| {
-            matches!(act.kind, ActKind::Speed(..) | ActKind::Profile(_) | ActKind::Meet(_) | ActKind::Keep(_))
-        };
         let Some(entity) = self.story.entity(name) else { return false };
         let is_timed = entity.way.as_ref().is_some_and(|way| way.timing.is_some());
-        !is_timed && !entity.events.iter().flat_map(|event| &event.acts).any(changes)
+        !is_timed && !entity.events.iter().flat_map(|event| &event.acts).any(is_speed)
     }
 
     pub fn meeting_fields(

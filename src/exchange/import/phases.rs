@@ -139,10 +139,11 @@ impl<'a> Cast<'a> {
             let mut fields = Vec::new();
             if let Some(event) = event {
                 for event in sequence.events().into_iter().filter(|other| same_moment(other, event)) {
+                    let ended = sequence.ends_what_goes_on(source, event)?;
                     if fields.is_empty() {
-                        fields.extend(sequence.ends_what_goes_on(source, event)?);
+                        fields.extend(ended);
                     }
-                    sequence.ends_as_it_begins(source, event)?;
+                    sequence.waits_for_known_ends(source, event)?;
                     if sequence.changes_speed_at(event) {
                         told.mps = None;
                     }
@@ -192,10 +193,6 @@ impl<'a> Cast<'a> {
                             source.refuse_if(waits, &act.mark, TIMES_LATER)?;
                             then
                         } else {
-                            let stands = told.mps == Some(0.0) && way.shape.drops_times;
-                            let reason =
-                                "its times are not read, and it stands: `Polyline` is read with times";
-                            source.refuse_if(stands, &act.mark, reason)?;
                             arrives(leg.end_m)
                         };
                         Takes::add(&mut own, then, way.timing.is_none());

@@ -15,7 +15,7 @@ use super::catalogue;
 use super::position::Position;
 use super::sky::{Change, Sky};
 use super::source::{Mark, Source, children, element, elements};
-use super::trigger::{Condition, GROUPS_MAX, Trigger, When, acts_at_once, both, is_less, reduced, trigger};
+use super::trigger::{GROUPS_MAX, Trigger, When, acts_at_once, both, is_less, reduced, trigger};
 use super::weather::{Weather, weather};
 
 /// The latest minor version that is read.
@@ -111,7 +111,7 @@ fn time_s(trigger: &Trigger) -> Option<f64> {
     match trigger.as_slice() {
         [] => Some(0.0),
         [all] => match all.as_slice() {
-            [Condition { kind: When::After(time_s), .. }] => Some(*time_s),
+            [only] => only.time_s(),
             _ => None,
         },
         _ => None,
@@ -486,7 +486,7 @@ impl Cast {
         }
         let is_at_once = |when: &Trigger| {
             when.is_empty()
-                || when.iter().any(|all| all.iter().all(|one| matches!(one.kind, When::After(s) if s <= 0.1)))
+                || when.iter().any(|all| all.iter().all(|one| one.time_s().is_some_and(|at_s| at_s <= 0.1)))
         };
         if !inner.has_tag_name("EntityAction") || element(inner, "DeleteEntityAction").is_none() {
             source.refuse::<()>(inner, "this action is not read in the story");

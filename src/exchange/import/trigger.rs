@@ -52,7 +52,7 @@ impl Condition {
     /// The time for which it waits, if it waits for one, s.
     pub fn time_s(&self) -> Option<f64> {
         match self.kind {
-            When::Always => Some(0.0),
+            When::Always => Some(self.delay_s),
             When::After(seconds) => Some(seconds + self.delay_s),
             _ => None,
         }

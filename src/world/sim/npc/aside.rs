@@ -24,7 +24,7 @@ const LANES_MAX: usize = 8;
 pub(super) struct Aside {
     /// The lane that it has still to change to.
     lane: Option<LaneChoice>,
-    /// Whether it was told that lane during a change, which it breaks off if that leads away from there.
+    /// Whether it was told that lane during a change, which it breaks off if it leaves that lane by it.
     was_told_midway: bool,
     /// m to the left of the middle of its lane.
     wanted_m: f64,
@@ -140,7 +140,7 @@ impl Driver {
         let Some(aside) = self.aside.as_deref_mut() else { return };
         let was_told_midway = core::mem::take(&mut aside.was_told_midway);
         let Aside { lane, wanted_m, now_m, told_mps, shift, .. } = aside.clone();
-        if was_told_midway && lane.is_some_and(|lane| self.leaves(lane, view)) {
+        if was_told_midway && lane.is_some_and(|lane| self.is_leaving(lane, view)) {
             self.break_off(told_mps, view.around);
         }
         if self.change.is_some() || shift.is_some() {
@@ -159,8 +159,8 @@ impl Driver {
         }
     }
 
-    /// Whether it drives in the lane that is meant, or is about to leave it.
-    fn leaves(&self, lane: LaneChoice, View { this, around, .. }: &View) -> bool {
+    /// Whether the lane that is meant is the one that the change under way leaves.
+    fn is_leaving(&self, lane: LaneChoice, View { this, around, .. }: &View) -> bool {
         let meant = chosen_lane(around, around.beside_route(this.outline.pose.position).0, lane);
         meant.is_ok_and(|meant| meant == self.way.lane_at(self.station_m).0)
     }

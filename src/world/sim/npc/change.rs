@@ -211,7 +211,9 @@ impl Driver {
         let Change { to, to_station_m, progress, duration_s: took_s, ends_m, .. } = change;
         let (left, left_m, aside_m) = (Arc::clone(&self.way), self.station_m, self.aside_m());
         let over = to.path.position_at(to_station_m) - left.path.position_at(left_m);
-        let duration_s = duration_s(over.norm(), self.speed_mps, Whose::Told(told_mps), around);
+        let back_s = duration_s(over.norm(), self.speed_mps, Whose::Told(told_mps), around);
+        // Quicker than what is left of the first change it would lead beyond the middle of the lane.
+        let duration_s = back_s.max(took_s * (1.0 - progress));
         self.comes_into(to, to_station_m, ends_m);
         self.last_change = self.last_change.map(|side| match side {
             Side::Left => Side::Right,

@@ -66,6 +66,26 @@ fn a_gap_to_the_ego_vehicle_is_kept_ahead_and_behind() {
 }
 
 #[test]
+fn a_lane_change_that_is_broken_off_early_leads_back_and_no_farther() {
+    for (out_mps, after_s, back_mps) in [(1.0, 0.7, 3.0), (0.6, 3.0, 3.0), (2.0, 0.1, 1.0)] {
+        let mut world = driven(&testing::straight(), 8.0, 1.0);
+        let user = spawn(&mut world, named(request(Verb::DriveAhead, 40.0, 8.0)));
+        let told = |lane, mps| Command { lane: Some(lane), aside_mps: Some(mps), ..Command::default() };
+        order(&mut world, told(LaneChoice::Right, out_mps));
+        drive(&mut world, 8.0, after_s);
+        let left_m = there(&world, user.id).outline.pose.position.y;
+        assert!((-5.25..-1.75).contains(&left_m), "{left_m} m: it is on its way");
+        order(&mut world, told(LaneChoice::Current, back_mps));
+        for _ in 0..700 {
+            world.tick(&hold(&world, 8.0));
+            let y_m = there(&world, user.id).outline.pose.position.y;
+            assert!(y_m <= -1.75 + 1e-9, "{y_m} m is beyond the middle of the lane");
+        }
+        assert!((there(&world, user.id).outline.pose.position.y + 1.75).abs() < 1e-9);
+    }
+}
+
+#[test]
 fn who_keeps_a_short_gap_brakes_as_hard_as_it_must() {
     let mut world = driven(&testing::straight(), 15.0, 8.0);
     let user = spawn(&mut world, named(request(Verb::DriveBehind, 12.0, 15.0)));
