@@ -143,62 +143,7 @@ impl<'a> Cast<'a> {
         {
             source.note("a speed relative to another's is that at the beginning of its change, unless it is `continuous`");
         }
-        let rate = match (dynamics.over, told.mps, mps) {
-            (Over::AtOnce | Over::Never, ..) => None,
-            (Over::Rate(rate), ..) => Some(Said::default().number(rate.abs() / dynamics.peak, "m/s^2")),
-            (Over::Time(time_s), Some(from), Some(to)) => {
-                (from != to).then(|| Said::default().number((to - from).abs() / time_s, "m/s^2"))
-            }
-            (Over::Way(way_m), Some(from), Some(to)) => (from != to)
-                .then(|| Said::default().number((to * to - from * from).abs() / (2.0 * way_m), "m/s^2")),
-            (Over::Time(time_s), ..) => Some(
-                Said::text("match npc.speed <= ")
-                    .then(said.clone())
-                    .and(" { true => (")
-                    .then(said.clone())
-                    .and(" - npc.speed) / ")
-                    .number(time_s, "s")
-                    .and(", false => (npc.speed - ")
-                    .then(Said::text("(").then(said.clone()).and(")"))
-                    .and(") / ")
-                    .number(time_s, "s")
-                    .and(" }"),
-            ),
-            (Over::Way(_), ..) => {
-                return source.refuse(mark, "over a way a speed changes only from one that the file says");
-            }
-        };
-        let change = Change::between(told.mps, mps);
-        let Body { gains_mps2, loses_mps2, .. } = moving.entity.body;
-        let rate = rate.map(|rate| match rate.0.as_slice() {
-            [Piece::Number(figure)] => {
-                // The peak of a curve is what a vehicle must be able to.
-                let mut within = |most_mps2: f64| {
-                    let mps2 = rate_within_mps2(source, most_mps2 / dynamics.peak, figure.value());
-                    Said::default().number(mps2, "m/s^2")
-                };
-                match change {
-                    Change::Up => within(gains_mps2),
-                    Change::Down => within(loses_mps2),
-                    Change::Unknown if figure.value() * dynamics.peak <= gains_mps2.min(loses_mps2) => {
-                        within(f64::INFINITY)
-                    }
-                    Change::Unknown => Said::text("match npc.speed <= ")
-                        .then(said.clone())
-                        .and(" { true => ")
-                        .then(within(gains_mps2))
-                        .and(", false => ")
-                        .then(within(loses_mps2))
-                        .and(" }"),
-                }
-            }
-            _ => {
-                source.note(
-                    "a change in a time from a speed that the file does not say is as fast as that takes, whatever its vehicle can",
-                );
-                rate
-            }
-        });
+        let rate = rate_of(source, mark, &moving.entity.body, (told.mps, mps, &said), dynamics)?;
         told.mps = mps;
         instead_of(fields, &PACE);
         let follows = Said::text(format!("{CONTINUOUS}, speed: ")).then(said.clone());
@@ -355,6 +300,73 @@ impl<'a> Cast<'a> {
         told.mps = mps;
         Some(())
     }
+}
+
+/// The rate of a change of speed, if it takes a time: from what speed, where that is known, to which one, and how that is said. No faster
+/// than the vehicle can, where the file says how fast it is before.
+fn rate_of(
+    source: &mut Source,
+    mark: &Mark,
+    body: &Body,
+    (from_mps, to_mps, said): (Option<f64>, Option<f64>, &Said),
+    dynamics: Dynamics,
+) -> Option<Option<Said>> {
+    let rate = match (dynamics.over, from_mps, to_mps) {
+        (Over::AtOnce | Over::Never, ..) => None,
+        (Over::Rate(rate), ..) => Some(Said::default().number(rate.abs() / dynamics.peak, "m/s^2")),
+        (Over::Time(time_s), Some(from), Some(to)) => {
+            (from != to).then(|| Said::default().number((to - from).abs() / time_s, "m/s^2"))
+        }
+        (Over::Way(way_m), Some(from), Some(to)) => (from != to)
+            .then(|| Said::default().number((to * to - from * from).abs() / (2.0 * way_m), "m/s^2")),
+        (Over::Time(time_s), ..) => Some(
+            Said::text("match npc.speed <= ")
+                .then(said.clone())
+                .and(" { true => (")
+                .then(said.clone())
+                .and(" - npc.speed) / ")
+                .number(time_s, "s")
+                .and(", false => (npc.speed - ")
+                .then(Said::text("(").then(said.clone()).and(")"))
+                .and(") / ")
+                .number(time_s, "s")
+                .and(" }"),
+        ),
+        (Over::Way(_), ..) => {
+            return source.refuse(mark, "over a way a speed changes only from one that the file says");
+        }
+    };
+    let change = Change::between(from_mps, to_mps);
+    let Body { gains_mps2, loses_mps2, .. } = *body;
+    Some(rate.map(|rate| match rate.0.as_slice() {
+        [Piece::Number(figure)] => {
+            // The peak of a curve is what a vehicle must be able to.
+            let mut within = |most_mps2: f64| {
+                let mps2 = rate_within_mps2(source, most_mps2 / dynamics.peak, figure.value());
+                Said::default().number(mps2, "m/s^2")
+            };
+            match change {
+                Change::Up => within(gains_mps2),
+                Change::Down => within(loses_mps2),
+                Change::Unknown if figure.value() * dynamics.peak <= gains_mps2.min(loses_mps2) => {
+                    within(f64::INFINITY)
+                }
+                Change::Unknown => Said::text("match npc.speed <= ")
+                    .then(said.clone())
+                    .and(" { true => ")
+                    .then(within(gains_mps2))
+                    .and(", false => ")
+                    .then(within(loses_mps2))
+                    .and(" }"),
+            }
+        }
+        _ => {
+            source.note(
+                "a change in a time from a speed that the file does not say is as fast as that takes, whatever its vehicle can",
+            );
+            rate
+        }
+    }))
 }
 
 /// A phase for each entry of a profile, which begins when the one before it has had its time, or has reached its speed if that

@@ -77,22 +77,8 @@ impl<'a> Cast<'a> {
         }
         let (at_once, later): (Vec<&Event>, Vec<&Event>) =
             events.into_iter().partition(|event| event.when.is_empty());
-        let mut groups: Vec<(Option<&Event>, Vec<&Act>)> = Vec::new();
-        let first = at_once.iter().flat_map(|event| &event.acts);
-        let first: Vec<&Act> = first.filter(|act| !is_placed(act)).collect();
-        if !first.is_empty() {
-            groups.push((None, first));
-        }
-        for event in later {
-            // What begins at the same moment is one phase.
-            let is_same = |(last, _): &&mut (Option<&Event>, Vec<&Act>)| {
-                last.is_some_and(|last| same_moment(last, event))
-            };
-            match groups.last_mut().filter(is_same) {
-                Some((_, acts)) => acts.extend(&event.acts),
-                None => groups.push((Some(event), event.acts.iter().collect())),
-            }
-        }
+        let first = at_once.iter().flat_map(|event| &event.acts).filter(|act| !is_placed(act)).collect();
+        let groups = by_moment(first, later);
         // Also one that only placed somebody, which took no time.
         let mut before: Vec<&Event> = entity.events.iter().filter(|event| event.when.is_empty()).collect();
         for (event, acts) in groups {
@@ -149,18 +135,7 @@ impl<'a> Cast<'a> {
                     }
                 }
             }
-            let mut aside = acts.iter().filter(|act| is_aside(act));
-            if let (Some(_), Some(second)) = (aside.next(), aside.next()) {
-                return source.refuse(&second.mark, "another move to the side begins at the same moment");
-            }
-            let mut speeds = acts.iter().filter(|act| matches!(act.kind, ActKind::Speed(..)));
-            if let (Some(_), Some(second)) = (speeds.next(), speeds.next()) {
-                return source.refuse(&second.mark, "another speed is told at the same moment");
-            }
-            if let Some(act) = acts.iter().find(|act| is_aside(act)) {
-                let stands = told.mps == Some(0.0) && !acts.iter().any(|act| is_speed(act));
-                source.refuse_if(stands, &act.mark, "it stands, and nobody slides aside here")?;
-            }
+            go_together(source, &acts, &told)?;
             let mut timed = Vec::new();
             let mut own: Option<Takes> = None;
             for act in acts {
@@ -359,6 +334,39 @@ pub fn instead_of(fields: &mut Vec<Said>, names: &[&str]) {
     fields.retain(|field| !names.contains(&field.name().as_str()));
 }
 
+/// What begins from the start, and then what begins at each moment: one phase each, with the first of its events.
+fn by_moment<'e>(first: Vec<&'e Act>, later: Vec<&'e Event>) -> Vec<(Option<&'e Event>, Vec<&'e Act>)> {
+    let mut groups: Vec<(Option<&Event>, Vec<&Act>)> = Vec::new();
+    if !first.is_empty() {
+        groups.push((None, first));
+    }
+    for event in later {
+        let is_same =
+            |(last, _): &&mut (Option<&Event>, Vec<&Act>)| last.is_some_and(|last| same_moment(last, event));
+        match groups.last_mut().filter(is_same) {
+            Some((_, acts)) => acts.extend(&event.acts),
+            None => groups.push((Some(event), event.acts.iter().collect())),
+        }
+    }
+    groups
+}
+
+/// Refuses what begins at one moment and cannot be said in one phase.
+fn go_together(source: &mut Source, acts: &[&Act], told: &Told) -> Option<()> {
+    let mut aside = acts.iter().filter(|act| is_aside(act));
+    if let (Some(_), Some(second)) = (aside.next(), aside.next()) {
+        return source.refuse(&second.mark, "another move to the side begins at the same moment");
+    }
+    let mut speeds = acts.iter().filter(|act| matches!(act.kind, ActKind::Speed(..)));
+    if let (Some(_), Some(second)) = (speeds.next(), speeds.next()) {
+        return source.refuse(&second.mark, "another speed is told at the same moment");
+    }
+    let Some(act) = acts.iter().find(|act| is_aside(act)) else { return Some(()) };
+    let stands = told.mps == Some(0.0) && !acts.iter().any(|act| is_speed(act));
+    source.refuse_if(stands, &act.mark, "it stands, and nobody slides aside here")
+}
+
+/// Whether two wait for the same.
 pub fn same_moment(a: &Event, b: &Event) -> bool {
     a.when.len() == b.when.len()
         && a.when.iter().zip(&b.when).all(|(a, b)| {
