@@ -2,7 +2,7 @@
 
 use avastra_base::geometry::{SMOOTH_STEP_SLOPE_MAX, wrap_angle};
 use avastra_lang::model::command::OFFSET_M;
-use avastra_road::{LanePlace, Side};
+use avastra_road::{Lane, LanePlace, Side};
 
 use super::action::{Dynamics, Over, Target};
 use super::order::is_aside;
@@ -47,41 +47,23 @@ impl<'a> Cast<'a> {
         wrap_angle(moving.path.heading_at(at_m) - lane_rad).abs() < core::f64::consts::FRAC_PI_2
     }
 
-    /// Refuses an offset of somebody whose way leads over roads with another direction.
-    pub fn keeps_its_sides(
+    /// Whether the lanes of all roads to come of somebody's way are alike in something, as far as steps of [`ROADS_M`] show.
+    pub fn are_lanes_alike<K: PartialEq>(
         &self,
-        source: &mut Source,
         moving: &Moving,
-        mark: &Mark,
         told: &Told,
-    ) -> Option<()> {
-        self.is_the_same_throughout(source, moving, mark, (told, false))
-    }
-
-    /// Refuses a place across in the road's terms of somebody whose way leads over roads in which these are others.
-    fn is_the_same_throughout(
-        &self,
-        source: &mut Source,
-        moving: &Moving,
-        mark: &Mark,
-        (told, has_number): (&Told, bool),
-    ) -> Option<()> {
-        let Some(own) = told.lane else { return Some(()) };
-        let key = |place: LanePlace| {
-            let lane = self.map.lane(place.lane);
-            (has_number.then_some(lane.key.lane), lane.is_along())
-        };
-        let road = &self.map.lane(own.lane).key.road;
-        if self.map.lanes.iter().all(|lane| lane.key.road == *road) {
-            return Some(());
+        of: impl Fn(&Lane) -> K,
+    ) -> bool {
+        let Some(own) = told.lane.map(|place| self.map.lane(place.lane)) else { return true };
+        if self.map.lanes.iter().all(|lane| lane.key.road == own.key.road) {
+            return true;
         }
         let steps = ((moving.path.length_m() - told.at_m) / ROADS_M) as usize;
-        let is_other = (0..=steps).any(|step| {
+        (0..=steps).all(|step| {
             let pose = moving.path.pose_at(told.at_m + step as f64 * ROADS_M);
-            self.places.borrow().in_plane(pose).lane.is_some_and(|place| key(place) != key(own))
-        });
-        let reason = "its way leads over roads whose lanes have other numbers, and on which of them it is by then is not known";
-        source.refuse_if(is_other, mark, reason)
+            let lane = self.places.borrow().in_plane(pose).lane;
+            lane.is_none_or(|place| of(self.map.lane(place.lane)) == of(own))
+        })
     }
 
     /// Where on its way, across, somebody is so much to the left of another one: as both begin, and as both are then.
@@ -143,7 +125,9 @@ impl<'a> Cast<'a> {
                 self.lane_beside(own, of, if goes_with { *lanes } else { -*lanes })
             }
             Target::Lane(id) => {
-                self.is_the_same_throughout(source, moving, mark, (told, true))?;
+                let are_alike = self.are_lanes_alike(moving, told, |lane| (lane.key.lane, lane.is_along()));
+                let reason = "its way leads over roads on which its lanes have other numbers, and on which of them it is by then is not known";
+                source.refuse_if(!are_alike, mark, reason)?;
                 let lane = self.map.lane(own.lane);
                 let s_m = lane.road_station_m(own.station_m);
                 self.map.place(&lane.key.road, *id, s_m).ok()

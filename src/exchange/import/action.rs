@@ -303,14 +303,9 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<ActKind> {
 }
 
 fn profile(source: &mut Source, action: Node) -> Option<Vec<SpeedEntry>> {
-    if source.word(action, "followingMode", &FOLLOWING)? != "position" {
+    let is_followed = source.word(action, "followingMode", &FOLLOWING)? != "position";
+    if is_followed {
         source.note("speeds change evenly, also where the file has a curve");
-        let first = children(action).find(|node| node.has_tag_name("SpeedProfileEntry"));
-        let is_at_once = first
-            .is_some_and(|node| node.attribute("time").is_some_and(|time| time.trim().parse() == Ok(0.0)));
-        let reason =
-            "a profile that is followed begins with the speed that is there: its first time is above 0";
-        source.refuse_if(is_at_once, action, reason)?;
     }
     if action.has_attribute("entityRef") {
         return source.refuse(action, "a profile of speeds that are relative to an entity is not read");
@@ -334,6 +329,9 @@ fn profile(source: &mut Source, action: Node) -> Option<Vec<SpeedEntry>> {
         entries.push(SpeedEntry { mps, time_s });
     }
     source.refuse_if(entries.is_empty(), action, "it has no `SpeedProfileEntry`")?;
+    let begins_at_once = entries.first().is_some_and(|first: &SpeedEntry| first.time_s == 0.0);
+    let reason = "a profile that is followed begins with the speed that is there: its first time is above 0";
+    source.refuse_if(is_followed && begins_at_once, action, reason)?;
     Some(entries)
 }
 

@@ -6,7 +6,7 @@ use avastra_lang::model::body::REAR_PART;
 use avastra_lang::model::vocabulary::BodyField;
 
 use super::catalogue;
-use super::source::{Source, children, element, elements};
+use super::source::{Mark, Source, children, element, elements};
 
 /// A vehicle's middle is not so far behind its rear axle, m.
 const BEHIND_M: f64 = 0.05;
@@ -38,6 +38,14 @@ impl Body {
 
     pub fn is_on_foot(&self) -> bool {
         matches!(self.like, "Pedestrian" | "Animal")
+    }
+}
+
+impl Body {
+    /// Refuses a speed above that of the file's vehicle.
+    pub fn drives(&self, source: &mut Source, mark: &Mark, mps: f64) -> Option<()> {
+        let most_mps = self.most_mps;
+        source.refuse_if(mps > most_mps, mark, format!("{mps:.1} m/s: its `maxSpeed` is {most_mps} m/s"))
     }
 }
 

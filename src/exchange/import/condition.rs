@@ -11,7 +11,7 @@ use super::said::Said;
 use super::scene::{Cast, Moving};
 use super::source::{Mark, Source};
 use super::story::Event;
-use super::trigger::{Clearance, Condition, Edge, Pair, Trigger, When};
+use super::trigger::{Clearance, Condition, Edge, Pair, Trigger, When, asks_for_less};
 
 /// From the ego vehicle's rear axle to its front in avastra, m: what the language's `ego.front` is ahead of a file's reference point.
 pub const EGO_FRONT_M: f64 = VehicleParameters::MKZ.rear_axle_to_front_m;
@@ -225,8 +225,8 @@ impl Waiting<'_, '_> {
                 let is_just = (self.apart_m(source, mark, pair)? - metres).abs() < JUST_M;
                 source.refuse_if(is_just, mark, AT_ITS_BOUND)?;
                 let (of, to) = (self.who(source, mark, &pair.of)?, self.who(source, mark, &pair.to)?);
-                let (above, below) = (pair.rule.sign(), pair.rule.against().sign());
-                let word = if pair.rule.is_less() { "and" } else { "or" };
+                let (above, below) = (pair.rule.symbol(), pair.rule.mirrored().symbol());
+                let word = if asks_for_less(pair.rule) { "and" } else { "or" };
                 let apart = || Said::text(format!("{of}.offset - {to}.offset "));
                 let said = Said::text("(").then(apart()).and(format!("{above} ")).number(metres, "m");
                 let other = apart().and(format!("{below} ")).number(-metres, "m").and(")");
@@ -268,11 +268,11 @@ impl Waiting<'_, '_> {
             }
             When::Speed { entity, mps, rule } => {
                 let who = self.who(source, mark, entity)?;
-                Some(Said::text(format!("{who}.speed {} ", rule.sign())).number(*mps, "m/s"))
+                Some(Said::text(format!("{who}.speed {} ", rule.symbol())).number(*mps, "m/s"))
             }
             When::Faster { of, to, mps, rule } => {
                 let (of, to) = (self.who(source, mark, of)?, self.who(source, mark, to)?);
-                Some(Said::text(format!("{of}.speed - {to}.speed {} ", rule.sign())).number(*mps, "m/s"))
+                Some(Said::text(format!("{of}.speed - {to}.speed {} ", rule.symbol())).number(*mps, "m/s"))
             }
             When::Nears { entity, position, seconds, is_free_space } => {
                 self.cast.stays(source, &position.0)?;
@@ -386,9 +386,9 @@ impl Waiting<'_, '_> {
         match &act.kind {
             ActKind::Meet(meeting) => {
                 let at_once = event.when.iter().all(|all| all.iter().all(|one| one.kind == When::Always));
-                let later =
-                    moving.entity.events.iter().skip_while(|other| !core::ptr::eq(*other, event)).skip(1);
-                let is_cut = later
+                let is_cut = moving
+                    .entity
+                    .after(event)
                     .filter(|other| other.acts.iter().any(is_speed) || other.overwrites)
                     .any(|other| !other.waits_for_the_end_of(event));
                 let reason = format!("whether `{name}` goes on until its place is reached is not known");
@@ -416,8 +416,8 @@ impl Waiting<'_, '_> {
             false => (&pair.to, &pair.of),
         };
         let way = self.between(source, mark, back, front, pair.is_free_space)?;
-        let said = way.clone().and(format!(" {} ", pair.rule.sign())).then(bound.clone());
-        Some(match pair.rule.is_less() {
+        let said = way.clone().and(format!(" {} ", pair.rule.symbol())).then(bound.clone());
+        Some(match asks_for_less(pair.rule) {
             false => {
                 Said::text("(").then(said).and(format!(" and {of}.speed > ")).number(0.0, "m/s").and(")")
             }
@@ -440,12 +440,12 @@ impl Waiting<'_, '_> {
     fn distance(&self, source: &mut Source, mark: &Mark, pair: &Pair, bound: &Said) -> Option<Said> {
         let is_apart =
             self.cast.is_far_off(source, mark, &pair.of)? || self.cast.is_far_off(source, mark, &pair.to)?;
-        if pair.rule.is_less() && (self.is_first || is_apart) {
-            let sign = format!(" {} ", pair.rule.sign());
+        if asks_for_less(pair.rule) && (self.is_first || is_apart) {
+            let sign = format!(" {} ", pair.rule.symbol());
             return Some(self.nearer(source, mark, pair)?.and(sign).then(bound.clone()));
         }
         let (sign, word) =
-            (format!(" {} ", pair.rule.sign()), if pair.rule.is_less() { " and " } else { " or " });
+            (format!(" {} ", pair.rule.symbol()), if asks_for_less(pair.rule) { " and " } else { " or " });
         let sides = [(&pair.of, &pair.to), (&pair.to, &pair.of)];
         let sides = sides.map(|(back, front)| {
             Some(self.between(source, mark, back, front, pair.is_free_space)?.and(&sign).then(bound.clone()))
@@ -545,8 +545,7 @@ impl Waiting<'_, '_> {
             let more_m = if is_free_space { more_m - overhangs_m } else { more_m };
             return Some(Said::text(format!("{to}.station - {from}.station + ")).number(more_m, "m"));
         }
-        let overhangs_m = self.cast.overhang_m(source, mark, front, false)?
-            + self.cast.overhang_m(source, mark, back, true)?;
+        let overhangs_m = self.cast.overhangs_m(source, mark, back, front)?;
         let said = Said::text(format!("{to}.rear - {from}.front"));
         Some(if is_free_space { said } else { said.and(" + ").number(overhangs_m, "m") })
     }

@@ -5,7 +5,7 @@ use avastra_base::geometry::Vec2;
 use super::across::LanesBeside;
 use super::condition::Waiting;
 use super::source::{Mark, Source};
-use super::trigger::{Condition, Edge, Pair, PlaceMark, Trigger, When};
+use super::trigger::{Condition, Edge, Pair, PlaceMark, Trigger, When, asks_for_less};
 
 impl Waiting<'_, '_> {
     /// Whether a condition holds at the beginning, as far as the speeds and places there say.
@@ -32,10 +32,7 @@ impl Waiting<'_, '_> {
                     let (back, front) =
                         if ahead_m >= 0.0 { pair(&room.of, &name) } else { pair(&name, &room.of) };
                     let outlines_m = match room.is_free_space {
-                        true => {
-                            self.cast.overhang_m(source, mark, &front, false)?
-                                + self.cast.overhang_m(source, mark, &back, true)?
-                        }
+                        true => self.cast.overhangs_m(source, mark, &back, &front)?,
                         false => 0.0,
                     };
                     let ahead_m = ahead_m.signum() * (ahead_m.abs() - outlines_m).max(0.0);
@@ -115,11 +112,10 @@ impl Waiting<'_, '_> {
     /// When a condition holds for the first time, as [`Self::comes_s`].
     fn holds_from_s(&self, source: &mut Source, condition: &Condition) -> Option<f64> {
         let mark = &condition.mark;
-        let takes_s = |way_m: f64, mps: f64| if mps > 0.0 { way_m / mps } else { f64::INFINITY };
         let gap = |source: &mut Source, pair: &Pair, bound_m: f64| {
             let closes_mps = self.closes_mps(source, mark, pair)?;
             let away_m = self.away_m(source, mark, pair)?;
-            Some(match pair.rule.is_less() {
+            Some(match asks_for_less(pair.rule) {
                 _ if pair.rule.holds(away_m, bound_m) => 0.0,
                 true => takes_s(away_m - bound_m, closes_mps),
                 false if closes_mps > 0.0 => (away_m + bound_m) / closes_mps,
@@ -134,7 +130,7 @@ impl Waiting<'_, '_> {
                     return gap(source, pair, bound_m);
                 }
                 // It must first be passed.
-                let more_m = if pair.rule.is_less() { 0.0 } else { bound_m };
+                let more_m = if asks_for_less(pair.rule) { 0.0 } else { bound_m };
                 Some(takes_s(self.away_m(source, mark, pair)? + more_m, self.closes_mps(source, mark, pair)?))
             }
             When::Travelled { entity, metres } => {
@@ -183,8 +179,7 @@ impl Waiting<'_, '_> {
             true => (fastest_mps - other_mps, other_mps - slowest_mps),
             false => (other_mps - slowest_mps, fastest_mps - other_mps),
         };
-        let takes_s = |way_m: f64, mps: f64| if mps > 0.0 { way_m / mps } else { f64::INFINITY };
-        Some(match pair.rule.is_less() {
+        Some(match asks_for_less(pair.rule) {
             true => takes_s(away_m - metres, closes_mps),
             false => takes_s(away_m + metres, closes_mps).min(takes_s(metres - away_m, parts_mps)),
         })
@@ -234,9 +229,7 @@ impl Waiting<'_, '_> {
         }
         let (back, front) =
             if self.is_behind(source, mark, pair)? { (&pair.of, &pair.to) } else { (&pair.to, &pair.of) };
-        let less_m = self.cast.overhang_m(source, mark, front, false)?
-            + self.cast.overhang_m(source, mark, back, true)?;
-        Some((away_m - less_m).max(0.0))
+        Some((away_m - self.cast.overhangs_m(source, mark, back, front)?).max(0.0))
     }
 
     /// Whether the second of two begins ahead of the first, as that looks.
@@ -249,4 +242,9 @@ impl Waiting<'_, '_> {
         let (of, to) = (self.cast.begins(source, mark, &pair.of)?, self.cast.begins(source, mark, &pair.to)?);
         Some(self.cast.station_m(of) < self.cast.station_m(to))
     }
+}
+
+/// How long a way takes at a speed, s; infinity if it does not lead there.
+fn takes_s(way_m: f64, mps: f64) -> f64 {
+    if mps > 0.0 { way_m / mps } else { f64::INFINITY }
 }

@@ -2,6 +2,8 @@
 //!
 //! A manoeuvre goes from phase to phase, and asks what is so now; a file's events come side by side, and remember.
 
+use avastra_lang::model::expr::Comparison;
+
 use super::action::{Act, ActKind, Over, Speed};
 use super::body::Body;
 use super::condition::{Waiting, is_called};
@@ -10,7 +12,7 @@ use super::said::Said;
 use super::scene::{Cast, Moving};
 use super::source::{Mark, Source};
 use super::story::Event;
-use super::trigger::{Condition, Edge, Pair, PlaceMark, Rule, Trigger, When};
+use super::trigger::{Condition, Edge, Pair, PlaceMark, Trigger, When, asks_for_less};
 
 /// What is estimated to come at most this much before what stands above it still counts as coming after it, s.
 const EARLY_S_MAX: f64 = 0.1;
@@ -19,7 +21,7 @@ const EARLY_S_MAX: f64 = 0.1;
 const LEAST_S: f64 = 1e-6;
 
 /// When what somebody does comes, and when it is over, if everybody goes on as they begin; `None`: it is not known.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Times {
     comes_s: Option<f64>,
     /// When it comes at the earliest.
@@ -31,7 +33,7 @@ struct Times {
     /// Whether it comes by what stands directly before it.
     is_made_to_come: bool,
     /// The least time by which it comes after what stands before it.
-    later_s: f64,
+    after_s_min: f64,
 }
 
 /// What somebody does, in its order, and what is known of when.
@@ -84,16 +86,16 @@ impl<'a> Cast<'a> {
                 }
                 _ => comes_s.zip(takes_s).map(|(comes_s, takes_s)| comes_s + takes_s),
             };
-            let later_s =
+            let after_s_min =
                 told_mps.and_then(|told_mps| waiting.takes_at_least_s(source, &event.when, told_mps));
             // As they begin it never comes: what stands directly before it changes that.
             let is_made_to_come = estimate_s == Some(f64::INFINITY)
                 && changes.is_some_and(|(changer, _)| changer + 1 == sequence.events.len());
-            let later_s = later_s.filter(|_| is_made_to_come).unwrap_or(0.0);
+            let after_s_min = after_s_min.filter(|_| is_made_to_come).unwrap_or(0.0);
             if changes.is_none() && event.acts.iter().any(is_speed) {
                 changes = Some((sequence.events.len(), least_s.unwrap_or(0.0)));
             }
-            let times = Times { comes_s, least_s, ends_s, takes_s, is_idle, is_made_to_come, later_s };
+            let times = Times { comes_s, least_s, ends_s, takes_s, is_idle, is_made_to_come, after_s_min };
             sequence.events.push((event, times));
             if event.acts.iter().any(is_speed) {
                 told_mps = told_mps.zip(mps).map(|((least, most), mps)| (mps.min(least), mps.max(most)));
@@ -154,8 +156,9 @@ impl<'e> Sequence<'e> {
         source.refuse(&event.mark, reason)
     }
 
-    pub fn events(&self) -> Vec<&'e Event> {
-        self.events.iter().map(|(event, _)| *event).collect()
+    /// What begins with an event, itself among it.
+    pub fn with(&self, event: &Event) -> impl Iterator<Item = &'e Event> {
+        self.events.iter().map(|(other, _)| *other).filter(move |other| same_moment(other, event))
     }
 
     /// When something of this sequence has begun or ended, if that is known.
@@ -171,11 +174,10 @@ impl<'e> Sequence<'e> {
     }
 
     /// What may still be under way when an event comes: events before it that take a time and of which it is not known that they are over.
-    fn under_way(&self, event: &Event) -> impl Iterator<Item = &'e Event> {
+    fn under_way(&self, event: &Event) -> Vec<&'e Event> {
         let at = self.events.iter().position(|(own, _)| core::ptr::eq(*own, event)).unwrap_or(0);
-        let (comes_s, later_s) =
-            self.events.get(at).map_or((None, 0.0), |(_, times)| (times.comes_s, times.later_s));
-        let before: Vec<&(&Event, Times)> = self.events.iter().take(at).collect();
+        let (comes_s, after_s_min) =
+            self.events.get(at).map_or((None, 0.0), |(_, times)| (times.comes_s, times.after_s_min));
         let is_over = |(other, times): &(&Event, Times)| {
             // What waits for the end of what waits for its end comes later still.
             let (mut ended, mut seen): (Vec<&Event>, Vec<&Event>) = (vec![event], Vec::new());
@@ -190,23 +192,24 @@ impl<'e> Sequence<'e> {
                     }
                 }
             }
-            times.takes_s.is_some_and(|takes_s| takes_s <= later_s + LEAST_S)
+            times.takes_s.is_some_and(|takes_s| takes_s <= after_s_min + LEAST_S)
                 || times
                     .ends_s
                     .zip(comes_s)
                     .is_some_and(|(ends_s, comes_s)| ends_s <= comes_s && comes_s.is_finite())
         };
-        let found: Vec<&'e Event> = before
-            .into_iter()
+        let before = self.events.iter().take(at);
+        before
             .filter(|other| !same_moment(other.0, event) && !is_over(other))
             .map(|(other, _)| *other)
-            .collect();
-        found.into_iter()
+            .collect()
     }
 
     /// Whether its speed may still change when an event comes.
     pub fn changes_speed_at(&self, event: &Event) -> bool {
-        self.under_way(event).any(|other| other.acts.iter().any(|act| is_speed(act) && takes_time(act)))
+        self.under_way(event)
+            .iter()
+            .any(|other| other.acts.iter().any(|act| is_speed(act) && takes_time(act)))
     }
 
     /// Refuses to wait for ends that come at another time here: of idle changes of speed, of steps to the side, and of moves over a way.
@@ -217,22 +220,18 @@ impl<'e> Sequence<'e> {
             }
             _ => false,
         };
-        for (other, times) in &self.events {
+        let changes = |acts: &[Act]| acts.iter().any(|act| is_speed(act) && takes_time(act));
+        for (other, times) in self.events.iter().filter(|(other, _)| event.waits_for_the_end_of(other)) {
             let reason = "it waits for the end of a change to the speed that is there already, which is done at once here";
-            source.refuse_if(times.is_idle && event.waits_for_the_end_of(other), &event.mark, reason)?;
-            let waits = event.waits_for_the_end_of(other) && other.acts.iter().any(of_way);
-            let changes = |acts: &[Act]| acts.iter().any(|act| is_speed(act) && takes_time(act));
-            let at_once = |act: &Act| is_aside(act) && !takes_time(act);
-            let is_slower = event.waits_for_the_end_of(other) && other.acts.iter().all(at_once);
+            source.refuse_if(times.is_idle, &event.mark, reason)?;
+            let is_step = other.acts.iter().all(|act| is_aside(act) && !takes_time(act));
             let reason =
                 "it waits for the end of a step to the side, for which a vehicle here needs its time";
-            source.refuse_if(is_slower && !other.acts.is_empty(), &event.mark, reason)?;
+            source.refuse_if(is_step && !other.acts.is_empty(), &event.mark, reason)?;
+            let is_slower =
+                other.acts.iter().any(of_way) && (self.changes_speed_at(other) || changes(&other.acts));
             let reason = "it waits for the end of a move to the side over a way, on which the speed changes";
-            source.refuse_if(
-                waits && (self.changes_speed_at(other) || changes(&other.acts)),
-                &event.mark,
-                reason,
-            )?;
+            source.refuse_if(is_slower, &event.mark, reason)?;
         }
         Some(())
     }
@@ -383,13 +382,16 @@ fn is_farther_on(before: &Condition, then: &Condition) -> bool {
     if before.delay_s > then.delay_s || ceases(before) || ceases(then) {
         return false;
     }
-    let is_farther = |first: (Rule, f64), second: (Rule, f64)| match (first.0.is_less(), second.0.is_less()) {
+    let is_farther = |first: (Comparison, f64), second: (Comparison, f64)| match (
+        asks_for_less(first.0),
+        asks_for_less(second.0),
+    ) {
         (true, true) => second.1 <= first.1,
         (false, false) => second.1 >= first.1,
         // It must first not be so, which is beyond the first bound.
         _ => {
             then.edge == Edge::Rising
-                && if first.0.is_less() { second.1 <= first.1 } else { second.1 >= first.1 }
+                && if asks_for_less(first.0) { second.1 <= first.1 } else { second.1 >= first.1 }
         }
     };
     match (&before.kind, &then.kind) {
@@ -410,7 +412,7 @@ fn is_farther_on(before: &Condition, then: &Condition) -> bool {
 /// Whether the second is about the way of the same two as the first, or about the way between outlines, which is shorter than that
 /// between reference points, where more is asked for, and the other way round.
 fn is_of_the_same(pair: &Pair, then: &Pair) -> bool {
-    let is_as_far = match pair.rule.is_less() {
+    let is_as_far = match asks_for_less(pair.rule) {
         false => then.is_free_space || !pair.is_free_space,
         true => pair.is_free_space || !then.is_free_space,
     };
@@ -490,23 +492,20 @@ impl Waiting<'_, '_> {
             for act in &other.acts {
                 match &act.kind {
                     ActKind::Speed(Speed::Absolute(mps), _) => known.push(*mps),
-                    ActKind::Speed(..) | ActKind::Profile(_) | ActKind::Meet(_) | ActKind::Keep(_) => {
-                        return source.refuse(mark, reason);
-                    }
-                    _ => {}
+                    _ => source.refuse_if(is_speed(act), mark, reason)?,
                 }
             }
         }
         let (least_mps, most_mps) =
             known.iter().fold((f64::MAX, f64::MIN), |(least, most), mps| (least.min(*mps), most.max(*mps)));
         source.refuse_if((least_mps..=most_mps).contains(&mps), mark, reason)?;
-        let is_at_once = |act: &Act| matches!(&act.kind, ActKind::Speed(_, dynamics) if matches!(dynamics.over, Over::AtOnce));
-        if event.acts.last().is_some_and(is_at_once) {
+        if !event.acts.last().is_some_and(takes_time) {
             return Some(());
         }
         // What cuts it short ends it, too, and then the speed is another one.
-        let later = moving.entity.events.iter().skip_while(|other| !core::ptr::eq(*other, event)).skip(1);
-        for other in later
+        for other in moving
+            .entity
+            .after(event)
             .filter(|other| other.acts.iter().any(is_speed) || other.overwrites && other.is_beside(event))
         {
             let reason = "another event may cut this short, and end it without its speed";
@@ -527,7 +526,13 @@ fn edges_are_alone(source: &mut Source, trigger: &Trigger, all: &[Condition]) ->
             return source.refuse(&edge.mark, reason);
         }
     }
-    for own in own.iter().filter(|one| one.is_running && all.len() > 1) {
+    runs_on(source, trigger, all)?;
+    begins_after_its_act(source, &of_act, &own)
+}
+
+/// Refuses what holds only while something runs, beside other conditions, which may come later.
+fn runs_on(source: &mut Source, trigger: &Trigger, all: &[Condition]) -> Option<()> {
+    for own in all.iter().filter(|one| one.is_running && !one.is_of_act && all.len() > 1) {
         let (When::Begun { name, .. } | When::Ended { name, .. }) = &own.kind else { continue };
         // What holds while it runs, and after it, holds from its beginning.
         let is_after =
@@ -537,6 +542,11 @@ fn edges_are_alone(source: &mut Source, trigger: &Trigger, all: &[Condition]) ->
             format!("it ceases to hold when `{name}` has ended, beside other conditions that may come later");
         source.refuse_if(!goes_on, &own.mark, reason)?;
     }
+    Some(())
+}
+
+/// Refuses edges and delays of conditions that may have come before the act in which they are asked begins.
+fn begins_after_its_act(source: &mut Source, of_act: &[&Condition], own: &[&Condition]) -> Option<()> {
     let latest_s = of_act.iter().map(|one| one.time_s()).collect::<Option<Vec<f64>>>();
     let latest_s = latest_s.map(|times| times.into_iter().fold(0.0, f64::max));
     let waits = |one: &&&Condition| one.edge != Edge::None || one.delay_s > 0.0;

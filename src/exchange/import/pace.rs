@@ -112,17 +112,12 @@ impl<'a> Cast<'a> {
                 (Said::text(format!("{}.speed * ", who(source, name)?)).number(*times, ""), None)
             }
         };
-        let most_mps = moving.entity.body.most_mps;
-        if let Speed::More(name, _) | Speed::Times(name, _) = wanted {
-            let of_mps = self.begins_mps(source, mark, name)?;
-            let begins_mps = match wanted {
-                Speed::Times(_, times) => of_mps * times,
-                Speed::More(_, more_mps) => of_mps + more_mps,
-                Speed::Absolute(mps) => *mps,
-            };
-            let reason = format!("{begins_mps:.1} m/s as they begin: its `maxSpeed` is {most_mps} m/s");
-            source.refuse_if(begins_mps > most_mps, mark, reason)?;
-        }
+        let begins_mps = match wanted {
+            Speed::Absolute(mps) => *mps,
+            Speed::More(name, more_mps) => self.begins_mps(source, mark, name)? + more_mps,
+            Speed::Times(name, times) => self.begins_mps(source, mark, name)? * times,
+        };
+        moving.entity.body.drives(source, mark, begins_mps)?;
         if let Some(mps) = mps {
             source.refuse_if(mps < 0.0, mark, "nobody drives backwards")?;
             source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), mark, too_fast(mps))?;

@@ -4,7 +4,7 @@ use avastra_lang::model::SPAWN_SPEED_MPS;
 use avastra_road::LanePlace;
 
 use super::across::aside_fields;
-use super::action::{Act, ActKind, Aside, Speed};
+use super::action::{Act, ActKind, Aside};
 use super::condition::Waiting;
 use super::order::{is_aside, is_speed};
 use super::pace::{self, PACE, too_fast};
@@ -124,7 +124,7 @@ impl<'a> Cast<'a> {
             }
             let mut fields = Vec::new();
             if let Some(event) = event {
-                for event in sequence.events().into_iter().filter(|other| same_moment(other, event)) {
+                for event in sequence.with(event) {
                     let ended = sequence.ends_what_goes_on(source, event)?;
                     if fields.is_empty() {
                         fields.extend(ended);
@@ -281,9 +281,6 @@ impl<'a> Cast<'a> {
             // Those of `phases`.
             ActKind::Follow(_) | ActKind::Profile(_) => Some(()),
             ActKind::Speed(wanted, dynamics) => {
-                let most_mps = moving.entity.body.most_mps;
-                let is_faster = matches!(wanted, Speed::Absolute(mps) if *mps > most_mps);
-                source.refuse_if(is_faster, mark, format!("its `maxSpeed` is {most_mps} m/s"))?;
                 self.speed_fields(source, moving, mark, wanted, *dynamics, told, fields)
             }
             ActKind::Lane(target, more_m, dynamics) => {
@@ -293,7 +290,9 @@ impl<'a> Cast<'a> {
                 aside_fields(source, mark, to_m, to, *dynamics, told, fields)
             }
             ActKind::Offset(Aside::InLane(offset_m), dynamics) => {
-                self.keeps_its_sides(source, moving, mark, told)?;
+                let reason = "its way leads over roads of which some run the other way, and to which side of them it is to be is not known";
+                let are_alike = self.are_lanes_alike(moving, told, |lane| lane.is_along());
+                source.refuse_if(!are_alike, mark, reason)?;
                 let to_m = told.lane_m + self.left_m(moving, told, *offset_m);
                 let to = Said::default().number(to_m, "m");
                 aside_fields(source, mark, to_m, to, *dynamics, told, fields)

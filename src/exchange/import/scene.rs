@@ -383,8 +383,13 @@ impl<'a> Cast<'a> {
         self.story.entity(name).map_or(0.0, |entity| entity.body.middle_m + entity.body.length_m / 2.0)
     }
 
+    /// What of the way between the reference points of two lies in their outlines, m.
+    pub fn overhangs_m(&self, source: &mut Source, mark: &Mark, back: &str, front: &str) -> Option<f64> {
+        Some(self.overhang_m(source, mark, front, false)? + self.overhang_m(source, mark, back, true)?)
+    }
+
     /// How far an end of somebody's outline lies beyond its reference point along the ego vehicle's route, m.
-    pub fn overhang_m(&self, source: &mut Source, mark: &Mark, name: &str, is_front: bool) -> Option<f64> {
+    fn overhang_m(&self, source: &mut Source, mark: &Mark, name: &str, is_front: bool) -> Option<f64> {
         if self.is_ego(name) {
             let rear_m = VehicleParameters::MKZ.length_m - EGO_FRONT_M;
             return Some(if is_front { EGO_FRONT_M } else { rear_m });
@@ -599,7 +604,6 @@ pub fn speed(source: &mut Source, story: &Story, entity: &Entity, depth: usize) 
     };
     source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), mark, too_fast(mps))?;
     source.refuse_if(mps < 0.0, mark, "no vehicle drives backwards")?;
-    let most_mps = entity.body.most_mps;
-    source.refuse_if(mps > most_mps, mark, format!("{mps} m/s: its `maxSpeed` is {most_mps} m/s"))?;
+    entity.body.drives(source, mark, mps)?;
     Some(mps)
 }

@@ -79,6 +79,13 @@ pub struct Event {
     pub comes_again: bool,
 }
 
+impl Entity {
+    /// What it does that stands after an event.
+    pub fn after(&self, event: &Event) -> impl Iterator<Item = &Event> {
+        self.events.iter().skip_while(move |other| !core::ptr::eq(*other, event)).skip(1)
+    }
+}
+
 impl Event {
     /// What somebody does from the beginning.
     fn of_init(mark: Mark, kind: ActKind) -> Event {
@@ -428,7 +435,7 @@ impl Cast {
                         source.refuse::<()>(event, reason);
                         return;
                     }
-                    let comes_again = [event, scope.group].into_iter().any(comes_again);
+                    let comes_again = [event, scope.group].into_iter().any(|node| comes_again(source, node));
                     let overwrites = matches!(priority, Some("override" | "overwrite"));
                     let (names, when) = (names.clone(), when.clone());
                     entity.events.push(Event { mark, names, when, acts, overwrites, comes_again });
@@ -643,8 +650,8 @@ fn is_carried_out(source: &mut Source, node: Node) -> bool {
 }
 
 /// Whether something may happen more than once.
-fn comes_again(node: Node) -> bool {
-    node.attribute("maximumExecutionCount").is_some_and(|count| count.trim() != "1")
+fn comes_again(source: &mut Source, node: Node) -> bool {
+    source.number_or(node, "maximumExecutionCount", 1.0).is_some_and(|count| count > 1.0)
 }
 
 /// When the scenario ends: at the first of the times that its stop trigger names, each with what must come beside it, or when the ego

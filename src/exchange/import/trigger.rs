@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use avastra_lang::model::expr::Comparison;
 use roxmltree::Node;
 
 use super::position::{Position, position};
@@ -68,49 +69,6 @@ pub enum Edge {
     Either,
 }
 
-/// How a value is to compare with a bound.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Rule {
-    Less,
-    AtMost,
-    More,
-    AtLeast,
-}
-
-impl Rule {
-    pub fn is_less(self) -> bool {
-        matches!(self, Rule::Less | Rule::AtMost)
-    }
-
-    pub fn holds(self, value: f64, bound: f64) -> bool {
-        match self {
-            Rule::Less => value < bound,
-            Rule::AtMost => value <= bound,
-            Rule::More => value > bound,
-            Rule::AtLeast => value >= bound,
-        }
-    }
-
-    pub fn sign(self) -> &'static str {
-        match self {
-            Rule::Less => "<",
-            Rule::AtMost => "<=",
-            Rule::More => ">",
-            Rule::AtLeast => ">=",
-        }
-    }
-
-    /// What it is for the same values with the other sign.
-    pub fn against(self) -> Rule {
-        match self {
-            Rule::Less => Rule::More,
-            Rule::AtMost => Rule::AtLeast,
-            Rule::More => Rule::Less,
-            Rule::AtLeast => Rule::AtMost,
-        }
-    }
-}
-
 #[derive(Debug, Clone, PartialEq)]
 pub enum When {
     /// It holds from the beginning.
@@ -163,14 +121,14 @@ pub enum When {
     Speed {
         entity: String,
         mps: f64,
-        rule: Rule,
+        rule: Comparison,
     },
     /// How much faster the first one is than the second, m/s.
     Faster {
         of: String,
         to: String,
         mps: f64,
-        rule: Rule,
+        rule: Comparison,
     },
     /// An entity would reach a place in less than `seconds`.
     Nears {
@@ -223,7 +181,7 @@ pub struct Clearance {
 pub struct Pair {
     pub of: String,
     pub to: String,
-    pub rule: Rule,
+    pub rule: Comparison,
     /// Between the outlines, not the reference points.
     pub is_free_space: bool,
     /// As the crow flies, and not along the road.
@@ -406,7 +364,7 @@ fn of_entity(source: &mut Source, inner: Node, of: &str) -> Option<When> {
             let target = source.required(inner, "TimeToCollisionConditionTarget")?;
             let rule = rule(source, inner)?;
             let is_free_space = source.switch(inner, "freespace", false)?;
-            source.refuse_if(!rule.is_less(), inner, "only `lessThan` is read")?;
+            source.refuse_if(!asks_for_less(rule), inner, "only `lessThan` is read")?;
             let seconds = source.amount(inner, "value")?;
             if let Some(place) = element(target, "Position") {
                 let position = PlaceMark(position(source, place)?);
@@ -551,17 +509,22 @@ fn pair(source: &mut Source, node: Node, of: &str) -> Option<Pair> {
     Some(Pair { of: of.to_owned(), to, rule: rule(source, node)?, is_free_space, is_straight })
 }
 
-/// Whether a rule asks for less.
-pub fn is_less(source: &mut Source, node: Node) -> Option<bool> {
-    Some(rule(source, node)?.is_less())
+/// Whether a comparison is for less than a bound, and not for more.
+pub fn asks_for_less(rule: Comparison) -> bool {
+    matches!(rule, Comparison::Less | Comparison::LessEqual)
 }
 
-fn rule(source: &mut Source, node: Node) -> Option<Rule> {
+/// Whether the rule of a condition asks for less.
+pub fn is_less(source: &mut Source, node: Node) -> Option<bool> {
+    Some(asks_for_less(rule(source, node)?))
+}
+
+fn rule(source: &mut Source, node: Node) -> Option<Comparison> {
     match source.text(node, "rule")?.as_str() {
-        "lessThan" => Some(Rule::Less),
-        "lessOrEqual" => Some(Rule::AtMost),
-        "greaterThan" => Some(Rule::More),
-        "greaterOrEqual" => Some(Rule::AtLeast),
+        "lessThan" => Some(Comparison::Less),
+        "lessOrEqual" => Some(Comparison::LessEqual),
+        "greaterThan" => Some(Comparison::Greater),
+        "greaterOrEqual" => Some(Comparison::GreaterEqual),
         other => source.refuse(node, format!("the rule `{other}` is not read: more or less is")),
     }
 }

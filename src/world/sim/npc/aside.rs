@@ -58,6 +58,9 @@ impl Aside {
     pub fn trace(&self, trace: &mut Trace) {
         trace.word(self.lane.map_or(0, |lane| lane as u64 + 1));
         trace.numbers([self.wanted_m, self.now_m, self.told_mps.unwrap_or(0.0)]);
+        if self.was_told_midway {
+            trace.word(1);
+        }
         if let Some(Shift { from_m, to_m, progress, duration_s }) = self.shift {
             trace.numbers([from_m, to_m, progress, duration_s]);
         }
