@@ -45,7 +45,13 @@ pub fn engine_words(field: &str) -> Vec<Entry> {
         Some(SpawnField::Turn) => of::<Turning>(),
         None if field == "body" => of::<Body>(),
         Some(
-            SpawnField::Speed | SpawnField::Offset | SpawnField::Meet | SpawnField::Waits | SpawnField::Siren,
+            SpawnField::Speed
+            | SpawnField::Offset
+            | SpawnField::Count
+            | SpawnField::Meet
+            | SpawnField::Waits
+            | SpawnField::Early
+            | SpawnField::Siren,
         )
         | None => Vec::new(),
     }

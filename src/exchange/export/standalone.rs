@@ -16,6 +16,7 @@ use avastra_lang::model::{BodyDef, Memory, Road, SPAWN_SPEED_MPS, Scenario, Spac
 use avastra_lang::syntax::ast::{ExprKind, Field, ItemKind};
 use avastra_lang::syntax::print_item;
 use avastra_world::action::{Effect, OrderRequest, SpawnRequest};
+use avastra_world::sim::VehicleParameters;
 
 /// The scenario in an exported file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -87,6 +88,7 @@ pub fn standalone(space: &Space, scenario: &Scenario, log: &EpisodeLog) -> Optio
     let lacks = [
         is_bound.then_some("the rules on lane changes of its space"),
         is_directed.then_some("the manoeuvres of its space"),
+        actions.is_moved.then_some("the place beside the ego vehicle at which somebody's way begins"),
         is_external.then_some("the driving system, which does not come with avastra"),
     ];
     Some(Standalone { text, lacks: lacks.into_iter().flatten().collect() })
@@ -100,6 +102,8 @@ struct Actions<'a> {
     bodies: BTreeMap<usize, &'a BodyDef>,
     /// The trajectories that they follow, likewise.
     trajectories: BTreeMap<usize, &'a TrajectoryDef>,
+    /// Whether a way that begins beside the ego vehicle begins behind it in the text.
+    is_moved: bool,
 }
 
 impl<'a> Actions<'a> {
@@ -126,7 +130,7 @@ impl<'a> Actions<'a> {
             Effect::Spawn(request) => self.spawn(space, request),
             Effect::Order(OrderRequest { bearer, command, .. }) => {
                 // An order of a manoeuvre, which the text lacks, lets its bearer drive on.
-                let fields = command_fields(command);
+                let fields = command_fields(space, command);
                 let name = &space.bearers[*bearer];
                 if fields.is_empty() { fields } else { format!("order {name} {{ {fields} }}") }
             }
@@ -145,10 +149,19 @@ impl<'a> Actions<'a> {
         let cover = request.cover.map(|cover| name(cover, request.cover_own.map(|own| own.index)));
         let cover = cover.map_or_else(String::new, |cover| format!(" from behind {cover}"));
         let name = request.bearer.map_or_else(String::new, |who| format!(" as {}", space.bearers[who]));
-        let place = match request.trajectory.map(|index| (index, &space.trajectories[index])) {
-            Some((index, trajectory)) => {
-                self.trajectories.insert(index, trajectory);
-                format!("on {} at", trajectory.name)
+        let mut distance_m = request.distance_m;
+        let place = match request.trajectory.map(|on| (on, &space.trajectories[on.index])) {
+            Some((on, trajectory)) => {
+                self.trajectories.insert(on.index, trajectory);
+                let (place, place_m) = match on.begins_m {
+                    None => ("at", distance_m),
+                    Some(begins_m) if begins_m >= 0.0 => ("ahead", begins_m),
+                    Some(begins_m) => ("behind", -begins_m - VehicleParameters::MKZ.length_m),
+                };
+                // No distance says it.
+                self.is_moved |= place_m < 0.0;
+                distance_m = place_m.max(0.0);
+                format!("on {} {place}", trajectory.name)
             }
             None if request.verb.begins_behind() => "behind".to_owned(),
             None => "ahead".to_owned(),
@@ -172,6 +185,9 @@ impl<'a> Actions<'a> {
         if let Some(meet) = request.meet {
             fields.push(format!("meet: {}", decimal(meet, false)));
         }
+        if let Some(early_s) = request.early_s {
+            fields.push(format!("early: {} s", decimal(early_s, false)));
+        }
         if let Some(waits_s) = request.waits_s {
             fields.push(format!("waits: {} s", decimal(waits_s, false)));
         }
@@ -185,7 +201,7 @@ impl<'a> Actions<'a> {
             fields.push(ignored_field(request.ignores));
         }
         fields.push(format!("colour: {}", request.colour.name()));
-        let distance = decimal(request.distance_m, false);
+        let distance = decimal(distance_m, false);
         format!("spawn {body}{name} {place} {distance} m{cover} {{ {} }}", fields.join(", "))
     }
 
@@ -307,7 +323,7 @@ fn ignored_field(ignores: IgnoredRules) -> String {
 }
 
 /// What a command says, as the fields of an order.
-fn command_fields(command: &Command) -> String {
+fn command_fields(space: &Space, command: &Command) -> String {
     let Command {
         speed_mps,
         rate_mps2,
@@ -316,9 +332,11 @@ fn command_fields(command: &Command) -> String {
         lane,
         offset_m,
         aside_mps,
+        aside_s,
         time_gap_s,
         keep_m,
         keep_s,
+        to,
         early_s,
         at_m,
         reach_m,
@@ -336,9 +354,11 @@ fn command_fields(command: &Command) -> String {
         lane.map(|lane| format!("lane: {}", lane.name())),
         figure("offset", offset_m, "m"),
         figure("aside", aside_mps, "m/s"),
+        figure("aside", aside_s, "s"),
         figure("time_gap", time_gap_s, "s"),
         figure("keep", keep_m, "m"),
         figure("keep", keep_s, "s"),
+        to.map(|who| format!("to: {}", space.bearers[who])),
         figure("early", early_s, "s"),
         figure("at", at_m, "m"),
         figure("reach", reach_m, "m"),

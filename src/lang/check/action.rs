@@ -16,7 +16,7 @@ use crate::model::vocabulary::{
     Colour, LaneChoice, Side, Site, SpaceClaim, SpawnField, Then, Turning, Verb, Word,
 };
 use crate::model::{
-    ActionDef, BodyWord, Domain, EffectDef, GroupDef, ManoeuvreCall, Parameter, RuleDef, SetDef, SpawnDef,
+    ActionDef, BodyWord, Domain, EffectDef, GroupDef, InRow, ManoeuvreCall, Parameter, RuleDef, SetDef, SpawnDef,
     Type, Value, WordExpr, code,
 };
 use crate::prove::product_size;
@@ -351,7 +351,7 @@ impl Checker {
                 Some(vec![EffectDef::Order(Box::new(order))])
             }
             ast::EffectKind::Spawn { body, bearers, place: side, distance, of, apart, cover, fields } => {
-                let behind = *side == ast::Place::Behind;
+                let behind = side.is_behind();
                 let on = side.trajectory().map(|trajectory| self.trajectory_word(trajectory, place));
                 let is_taken = |name: &&ast::Name| place.locals.iter().any(|(local, _)| *local == name.text);
                 if let Some(name) = bearers.iter().find(is_taken) {
@@ -362,12 +362,23 @@ impl Checker {
                 }
                 let of = of.as_ref().map(|of| self.named_road_user(of, place));
                 let cover = cover.as_ref().map(|cover| self.body_word(cover, place));
+                let count = self.count_of_row(fields, apart.is_some(), place);
                 let apart = apart.as_ref().map(|apart| self.apart(apart, bearers, place));
+                let is_on_map = matches!(side, ast::Place::On(_));
                 let has_place = (behind, of.is_some() || on.is_some());
                 let spawn = self.spawn(body, has_place, distance, fields, place, effect.span)?;
-                self.check_trajectory(on.is_some(), of.is_some(), &spawn.verb, effect.span);
+                let ways = on.as_ref().and_then(Option::as_ref).map(|on| (is_on_map, possible(on)));
+                self.check_trajectory(on.is_some(), ways, of.is_some(), &spawn.verb, effect.span);
+                let count = count?;
                 let (of, cover, trajectory) = (as_written(of)?, as_written(cover)?, as_written(on)?);
                 self.check_cover(cover.as_ref(), &spawn.verb, effect.span);
+                if of.is_some() && possible(&spawn.verb).contains(&Verb::CrossRoad) {
+                    let message = "`CrossRoad` begins where it meets the ego vehicle in time, beside nobody";
+                    let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(effect.span, "spawned here");
+                    self.report(error.help(
+                        "leave `of` out; several that cross one after the other are a row: `as [first, second] ahead 60 m apart 10 m`",
+                    ));
+                }
                 let spawn = SpawnDef { cover, of, trajectory, ..spawn };
                 let bearer = |name: &ast::Name| self.bearers.iter().position(|one| *one == name.text);
                 let one = |spawn: SpawnDef| EffectDef::Spawn(Box::new(spawn));
@@ -388,7 +399,8 @@ impl Checker {
                     (Some(apart), names) => {
                         let apart = apart?;
                         let nth = |(nth, name)| {
-                            let row = (nth > 0).then(|| (nth, apart.clone()));
+                            let row = || InRow { nth, apart: apart.clone(), count: count.clone(), named: names.len() };
+                            let row = (nth > 0).then(row);
                             one(SpawnDef { bearer: bearer(name), row, ..spawn.clone() })
                         };
                         Some(names.iter().enumerate().map(nth).collect())
@@ -396,6 +408,24 @@ impl Checker {
                 }
             }
         }
+    }
+
+    /// How many of a row appear; `Some(None)` where nothing is said.
+    fn count_of_row(
+        &mut self,
+        fields: &[ast::Field],
+        is_row: bool,
+        place: &Place<'_>,
+    ) -> Option<Option<Expr>> {
+        let Some(field) = fields.iter().find(|field| field.name.text == SpawnField::Count.name()) else {
+            return Some(None);
+        };
+        if !is_row {
+            let error = Diagnostic::error(code::NOT_HERE, "`count` belongs to a row of several road users");
+            let help = "name them all, and say how far apart they are: `as [first, second] ahead 50 m apart 15 m`";
+            return self.reject(error.at(field.name.span, "there is no row").help(help));
+        }
+        self.typed(&field.value, place, Type::Int).map(Some)
     }
 
     /// The gap between the road users of a row, which are named.
@@ -481,6 +511,10 @@ impl Checker {
             Some(value) => self.typed(value, place, Type::Quantity(Dimension::RATIO)).map(Some),
             None => Some(None),
         };
+        let early = match find(SpawnField::Early) {
+            Some(value) => self.typed(value, place, Type::Quantity(Dimension::DURATION)).map(Some),
+            None => Some(None),
+        };
         let waits = match find(SpawnField::Waits) {
             Some(value) => self.typed(value, place, Type::Quantity(Dimension::DURATION)).map(Some),
             None => Some(None),
@@ -508,6 +542,7 @@ impl Checker {
             ignores: ignores?,
             meet: meet?,
             waits: waits?,
+            early: early?,
             siren: siren?,
             turn: turn?,
             bearer: None,
@@ -517,23 +552,43 @@ impl Checker {
         })
     }
 
-    /// Reports who follows a trajectory without one, and who has one and does something else.
-    fn check_trajectory(&mut self, is_on: bool, is_beside: bool, verb: &WordExpr<Verb>, span: Span) {
+    /// Reports who follows a trajectory without one, who has one and does something else, and a place that is none on a way: a
+    /// station counts `at` one of a map, a distance `ahead` or `behind` on one beside the ego vehicle's route. `ways` are those
+    /// that the trajectory may be, and whether the place is a station.
+    fn check_trajectory(
+        &mut self,
+        is_on: bool,
+        ways: Option<(bool, Vec<usize>)>,
+        is_beside: bool,
+        verb: &WordExpr<Verb>,
+        span: Span,
+    ) {
+        let (at_station, ways) = ways.unwrap_or_default();
+        let other = ways.iter().map(|way| &self.trajectories[*way]);
+        let other = other.clone().find(|way| way.is_beside_route() == at_station).map(|way| way.name.clone());
         let odd = possible(verb).into_iter().find(|verb| (*verb == Verb::Follow) != is_on);
-        let (message, help) = match odd {
-            Some(Verb::Follow) => (
+        let (message, help) = match (odd, other) {
+            (Some(Verb::Follow), _) => (
                 "`Follow` needs a trajectory".to_owned(),
-                "write where it begins: `on NAME at 12 m` in place of `ahead` or `behind`",
+                "write where it begins: `on NAME at 12 m`, or `on NAME ahead 40 m` where that lies beside the route",
             ),
-            Some(verb) => (
+            (Some(verb), _) => (
                 format!("`{}` does not begin on a trajectory", verb.name()),
                 "write `does: Follow`, or `ahead` and a distance",
             ),
-            None if is_on && is_beside => (
+            (None, Some(name)) if at_station => (
+                format!("`{name}` lies beside the ego vehicle's route, wherever it begins"),
+                "say where: `on NAME ahead 40 m`, or `behind`",
+            ),
+            (None, Some(name)) => (
+                format!("`{name}` lies on a map"),
+                "say the station at which it begins there, `on NAME at 12 m`, or leave the `road` of the trajectory out",
+            ),
+            (None, None) if at_station && is_beside => (
                 "the place is said twice".to_owned(),
                 "leave `of` out: a station on a trajectory is beside nobody",
             ),
-            None => return,
+            (None, None) => return,
         };
         let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
         self.report(error.help(help));
@@ -610,6 +665,9 @@ impl Checker {
                 }
                 () if verb != Verb::Walk && says(SpawnField::Waits) => {
                     ("waits at no kerb", "`waits` is for `Walk`; leave it out")
+                }
+                () if verb != Verb::CrossRoad && says(SpawnField::Early) => {
+                    ("does not meet the ego vehicle at a junction", "`early` is for `CrossRoad`, and for manoeuvres; leave it out")
                 }
                 () if says(SpawnField::Meet) && says(SpawnField::Waits) => {
                     ("sets out after a time or for a meeting", "leave `waits` or `meet` out")

@@ -21,6 +21,7 @@ use crate::syntax::{Diagnostic, ast};
 use avastra_base::units::Dimension;
 
 const LENGTH: Type = Type::Quantity(Dimension::LENGTH);
+const SPEED: Type = Type::Quantity(Dimension::SPEED);
 const DURATION: Type = Type::Quantity(Dimension::DURATION);
 
 /// Times that a phase waits, s.
@@ -433,14 +434,28 @@ impl Checker {
         let speed = figure(CommandField::Speed, Dimension::SPEED);
         let rate = figure(CommandField::Rate, Dimension::ACCEL);
         let offset = figure(CommandField::Offset, Dimension::LENGTH);
-        let aside = figure(CommandField::Aside, Dimension::SPEED);
         let time_gap = figure(CommandField::TimeGap, Dimension::DURATION);
         let early = figure(CommandField::Early, Dimension::DURATION);
         let at = figure(CommandField::At, Dimension::LENGTH);
         let reach = figure(CommandField::Reach, Dimension::LENGTH);
         let steady = figure(CommandField::Steady, Dimension::LENGTH);
         let keep = match field(fields, CommandField::Keep) {
-            Some(value) => Some(self.gap(value, place)?),
+            Some(value) => {
+                let help = "write a way or a time: `keep: 20 m`, `keep: 1.5 s`";
+                Some(self.either(value, [LENGTH, DURATION], ("`keep` is a gap", help), place)?)
+            }
+            None => None,
+        };
+        let aside = match field(fields, CommandField::Aside) {
+            Some(value) => {
+                let message = "`aside` is a speed to the side, or how long the move takes";
+                let help = "write `aside: 1.5 m/s`, or `aside: 3 s`";
+                Some(self.either(value, [SPEED, DURATION], (message, help), place)?)
+            }
+            None => None,
+        };
+        let to = match field(fields, CommandField::To) {
+            Some(value) => Some(self.kept(value, place)?),
             None => None,
         };
         let lane = match field(fields, CommandField::Lane) {
@@ -479,6 +494,7 @@ impl Checker {
             all = false;
         }
         for (part, of, is_there) in [
+            (CommandField::To, "a `keep`", keeps),
             (CommandField::At, "an `early`", is_early),
             (CommandField::Reach, "an `early` and an `at`", is_early && says(CommandField::At)),
             (
@@ -511,6 +527,7 @@ impl Checker {
             aside,
             time_gap,
             keep,
+            to,
             early,
             at,
             reach,
@@ -521,19 +538,31 @@ impl Checker {
         })
     }
 
-    /// The gap that is kept: a way or a time.
-    fn gap(&mut self, value: &ast::Expr, place: &Place<'_>) -> Option<Expr> {
+    /// A quantity of one of two types. The message and the help are for another one.
+    fn either(
+        &mut self,
+        value: &ast::Expr,
+        types: [Type; 2],
+        (message, help): (&str, &str),
+        place: &Place<'_>,
+    ) -> Option<Expr> {
         let found = self.expr(value, place, None)?;
-        match found.ty {
-            LENGTH | DURATION => Some(found),
-            ty => {
-                let error = Diagnostic::error(code::UNIT_MISMATCH, "`keep` is a gap");
-                let found = format!("this is a `{}`", self.references.type_name(ty));
-                self.reject(
-                    error.at(value.span, found).help("write a way or a time: `keep: 20 m`, `keep: 1.5 s`"),
-                )
-            }
+        if types.contains(&found.ty) {
+            return Some(found);
         }
+        let label = format!("this is a `{}`", self.references.type_name(found.ty));
+        let error = Diagnostic::error(code::UNIT_MISMATCH, message);
+        self.reject(error.at(value.span, label).help(help))
+    }
+
+    /// The road user to whom a gap is kept.
+    fn kept(&mut self, value: &ast::Expr, place: &Place<'_>) -> Option<Who> {
+        if let ast::ExprKind::Name(name) = &value.kind {
+            return self.named_road_user(&ast::Name::new(name, value.span), place);
+        }
+        self.look_at(value, place, None);
+        let error = Diagnostic::error(code::TYPE_MISMATCH, "a gap is kept to a road user that has a name");
+        self.reject(error.at(value.span, "no name").help("write `to: truck`, or leave `to` out for the ego vehicle"))
     }
 
     /// The rules of the road that are ignored: `[Signals, Ego]`.

@@ -8,8 +8,8 @@ use crate::check::expression::Place;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, field};
 use crate::check::road::Maps;
-use crate::model::vocabulary::{PointField, TrajectoryField};
-use crate::model::{Road, Trajectory, TrajectoryDef, Type, WordExpr, code};
+use crate::model::vocabulary::{PointField, TrajectoryField, Word};
+use crate::model::{BesideRoute, Laid, Road, Trajectory, TrajectoryDef, Type, WayPoint, WordExpr, code, through};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use avastra_base::geometry::{Path, Vec2};
@@ -19,11 +19,11 @@ use avastra_road::RoadMap;
 /// A way that is shorter leads nowhere, m.
 const LENGTH_M_MIN: f64 = 0.1;
 
-/// Where a way leads through, and how far one is turned to its left there.
-struct Point {
-    place: Vec2,
-    turned_rad: f64,
-}
+/// Points along the ego vehicle's route lie at most so far before and behind where the way begins, and beside the route, m.
+const ALONG_M: f64 = 1000.0;
+const BESIDE_ROUTE_M: f64 = 100.0;
+
+const BESIDE_EXAMPLE: &str = "points: [{ along: 0 m, offset: -3 m }, { along: 15 m, offset: 0 m }]";
 
 /// The road under a point is at most so far beside it, m; beyond that the height is taken for 0 m.
 const BESIDE_M: f64 = 30.0;
@@ -60,15 +60,47 @@ impl Checker {
     /// Lays every trajectory on the map of its road, and gives it to all roads on that map. `roads` may lack those with mistakes.
     pub(super) fn lay_trajectories(&mut self, roads: &mut [Option<Road>], maps: &mut dyn Maps) {
         for definition in self.trajectories.clone() {
-            let laid = self.laid(&definition.declared, roads, maps);
+            if definition.is_beside_route() {
+                let laid = self.beside_route(&definition.declared).map(|way| Laid::BesideRoute(Arc::new(way)));
+                roads.iter_mut().flatten().for_each(|road| road.trajectories.push(laid.clone()));
+                continue;
+            }
+            let laid = self.on_map(&definition.declared, roads, maps);
             for road in roads.iter_mut().flatten() {
                 let on_it = laid.as_ref().filter(|(map_path, _)| *map_path == road.map_path);
-                road.trajectories.push(on_it.map(|(_, trajectory)| Arc::clone(trajectory)));
+                road.trajectories.push(on_it.map(|(_, trajectory)| Laid::OnMap(Arc::clone(trajectory))));
             }
         }
     }
 
-    fn laid(
+    /// A trajectory without a `road`: all its points lie along the ego vehicle's route.
+    fn beside_route(&mut self, block: &ast::Block) -> Option<BesideRoute> {
+        let fields = self.fields_known::<TrajectoryField>(&block.fields);
+        let name = &block.name;
+        let points = field(&fields, TrajectoryField::Points);
+        let is_along = |item: &ast::Expr| match &item.kind {
+            ast::ExprKind::Record(fields) => {
+                fields.iter().any(|field| field.name.text == PointField::Along.name())
+            }
+            _ => false,
+        };
+        let items = match points.map(|points| (points, &points.kind)) {
+            Some((points, ast::ExprKind::List(items))) if items.iter().any(is_along) => {
+                self.places(points, BESIDE_EXAMPLE)?
+            }
+            _ => {
+                let message = format!("trajectory `{}` has no `road`", name.text);
+                let error = Diagnostic::error(code::MISSING_FIELD, message);
+                return self.reject(error.at(name.span, "`road: …` is missing").help(format!(
+                    "without one it lies beside the ego vehicle's route, wherever it begins: `{BESIDE_EXAMPLE}`"
+                )));
+            }
+        };
+        let points = all_of(items.iter().map(|item| self.point_beside(item)))?;
+        BesideRoute::new(&points).or_else(|| self.has_no_length(block.name.span))
+    }
+
+    fn on_map(
         &mut self,
         block: &ast::Block,
         roads: &[Option<Road>],
@@ -76,10 +108,7 @@ impl Checker {
     ) -> Option<(PathBuf, Arc<Trajectory>)> {
         let fields = self.fields_known::<TrajectoryField>(&block.fields);
         let name = &block.name;
-        let Some(road) = field(&fields, TrajectoryField::Road) else {
-            let message = format!("trajectory `{}` has no `road`", name.text);
-            return self.missing_field(TrajectoryField::Road, name.span, message);
-        };
+        let road = field(&fields, TrajectoryField::Road)?;
         let road_name = self.name_of(road, "a road")?;
         let Some(road) = roads.iter().flatten().find(|known| known.name == road_name) else {
             if self.road_names.iter().any(|known| known == road_name) {
@@ -151,40 +180,77 @@ impl Checker {
     fn through_points(&mut self, list: &ast::Expr, map: &Arc<RoadMap>) -> Option<(Path, Vec<(f64, f64)>)> {
         let items = self.places(list, "points: [{ x: 0 m, y: 3 m }, { x: 40 m, y: 3 m }]")?;
         let points = all_of(items.iter().map(|item| self.point(item, map)))?;
-        let places: Vec<Vec2> = points.iter().map(|point| point.place).collect();
-        let path = self.long_enough(Path::through(&places), list.span)?;
-        let mut station_m = 0.0;
-        let mut turns = Vec::new();
-        for (nth, point) in points.iter().enumerate() {
-            let step_m = nth.checked_sub(1).map_or(0.0, |before| (point.place - places[before]).norm());
-            station_m += step_m;
-            if step_m > 0.0 || nth == 0 {
-                turns.push((station_m, point.turned_rad));
-            }
-        }
-        turns.retain(|_| points.iter().any(|point| point.turned_rad != 0.0));
-        Some((path, turns))
+        let (path, turns) = match through(&points) {
+            Some(found) => found,
+            None => return self.has_no_length(list.span),
+        };
+        Some((self.long_enough(Some(path), list.span)?, turns))
     }
 
     fn long_enough(&mut self, path: Option<Path>, span: Span) -> Option<Path> {
-        path.filter(|path| path.length_m() >= LENGTH_M_MIN).or_else(|| {
-            let error = Diagnostic::error(code::SETTING, "the trajectory has no length");
-            self.reject(error.at(span, format!("must be at least {LENGTH_M_MIN} m long")))
-        })
+        path.filter(|path| path.length_m() >= LENGTH_M_MIN).or_else(|| self.has_no_length(span))
+    }
+
+    fn has_no_length<T>(&mut self, span: Span) -> Option<T> {
+        let error = Diagnostic::error(code::SETTING, "the trajectory has no length");
+        self.reject(error.at(span, format!("must be at least {LENGTH_M_MIN} m long")))
+    }
+
+    /// A point along the ego vehicle's route.
+    fn point_beside(&mut self, item: &ast::Expr) -> Option<WayPoint> {
+        let wrong = |checker: &mut Checker, span| {
+            let message = "a point beside the route is `along` it, with an `offset` or without";
+            let error = Diagnostic::error(code::MISSING_FIELD, message).at(span, "is not");
+            checker.reject(error.help("write `{ along: 12 m, offset: -3 m }`, or give the trajectory a `road`"))
+        };
+        let ast::ExprKind::Record(fields) = &item.kind else { return wrong(self, item.span) };
+        let fields = self.fields_known::<PointField>(fields);
+        let elsewhere =
+            fields.iter().find(|(known, _)| matches!(known, PointField::At | PointField::X | PointField::Y));
+        if let Some((_, value)) = elsewhere {
+            return wrong(self, value.span);
+        }
+        let Some(along) = field(&fields, PointField::Along) else { return wrong(self, item.span) };
+        let along_m = self.bounded_m(along, ALONG_M)?;
+        let offset_m = match field(&fields, PointField::Offset) {
+            Some(offset) => self.bounded_m(offset, BESIDE_ROUTE_M)?,
+            None => 0.0,
+        };
+        let turned_rad = self.turned_rad(&fields)?;
+        Some(WayPoint { place: Vec2::new(along_m, offset_m), turned_rad })
+    }
+
+    fn turned_rad(&mut self, fields: &[(PointField, &ast::Expr)]) -> Option<f64> {
+        match field(fields, PointField::Turned) {
+            Some(value) => self.number_of(value, Dimension::ANGLE),
+            None => Some(0.0),
+        }
+    }
+
+    /// A length that is not farther from 0 m than this.
+    fn bounded_m(&mut self, value: &ast::Expr, most_m: f64) -> Option<f64> {
+        let number_m = self.number_of(value, Dimension::LENGTH)?;
+        if number_m.abs() <= most_m {
+            return Some(number_m);
+        }
+        let error = Diagnostic::error(code::SETTING, format!("must lie between -{most_m} m and {most_m} m"));
+        self.reject(error.at(value.span, "too far away"))
     }
 
     /// A point: a place on a lane, one beside it, or one in the plane.
-    fn point(&mut self, item: &ast::Expr, map: &RoadMap) -> Option<Point> {
+    fn point(&mut self, item: &ast::Expr, map: &RoadMap) -> Option<WayPoint> {
         let ast::ExprKind::Record(fields) = &item.kind else {
             let place = self.lane_point(item, map)?;
             let place = map.lane(place.lane).centre.position_at(place.station_m);
-            return Some(Point { place, turned_rad: 0.0 });
+            return Some(WayPoint { place, turned_rad: 0.0 });
         };
         let fields = self.fields_known::<PointField>(fields);
-        let turned_rad = match field(&fields, PointField::Turned) {
-            Some(value) => self.number_of(value, Dimension::ANGLE)?,
-            None => 0.0,
-        };
+        let turned_rad = self.turned_rad(&fields)?;
+        if let Some(along) = field(&fields, PointField::Along) {
+            let message = "a point `along` the ego vehicle's route lies on no road's map";
+            let error = Diagnostic::error(code::NOT_HERE, message).at(along.span, "beside a `road`");
+            return self.reject(error.help("leave the `road` out, or write where the point lies on its map"));
+        }
         let mut number =
             |wanted| field(&fields, wanted).map(|value| self.number_of(value, Dimension::LENGTH));
         let (x, y, offset) = (number(PointField::X), number(PointField::Y), number(PointField::Offset));
@@ -193,10 +259,10 @@ impl Checker {
                 let place = self.lane_point(at, map)?;
                 let pose = map.lane(place.lane).centre.pose_at(place.station_m);
                 let place = pose.offset(0.0, offset.unwrap_or(Some(0.0))?).position;
-                Some(Point { place, turned_rad })
+                Some(WayPoint { place, turned_rad })
             }
             (None, Some(x), Some(y)) if offset.is_none() => {
-                Some(Point { place: Vec2::new(x?, y?), turned_rad })
+                Some(WayPoint { place: Vec2::new(x?, y?), turned_rad })
             }
             _ => {
                 let message =

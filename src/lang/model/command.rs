@@ -4,10 +4,11 @@
 use core::ops::RangeInclusive;
 
 use crate::model::eval::{Facts, evaluate};
-use crate::model::expr::{Expr, ExprKind};
-use crate::model::limits::{SPEED_MPS_MAX, out_of_bounds, rounded_into};
+use crate::model::expr::{Expr, ExprKind, Who};
+use crate::model::limits::{EARLY_S, SPEED_MPS_MAX, out_of_bounds, rounded_into};
 use crate::model::space::{FnDef, WordExpr};
 use crate::model::value::Type;
+use avastra_base::geometry::SMOOTH_STEP_SLOPE_MAX;
 use avastra_base::units::{Dimension, Rational};
 
 use crate::model::vocabulary::{CommandField, LaneChoice, TrafficRule, Turning, Verb, Word};
@@ -23,7 +24,7 @@ const BACK_MPS_MAX: f64 = ON_FOOT_MPS_MAX;
 
 /// What a road user is told: fields of an order. Not everybody can be told all of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Told(u16);
+pub struct Told(u32);
 
 impl Told {
     pub const NOTHING: Told = Told(0);
@@ -41,13 +42,14 @@ impl Told {
     }
 
     /// These figures, and which of the words, in this order.
-    fn all(figures: impl Iterator<Item = CommandField>, words: [bool; 5]) -> Told {
-        const WORDS: [CommandField; 5] = [
+    fn all(figures: impl Iterator<Item = CommandField>, words: [bool; 6]) -> Told {
+        const WORDS: [CommandField; 6] = [
             CommandField::Lane,
             CommandField::Ignores,
             CommandField::Siren,
             CommandField::Turn,
             CommandField::Continuous,
+            CommandField::To,
         ];
         let words = WORDS.into_iter().zip(words).filter(|(_, says)| *says).map(|(field, _)| field);
         figures.chain(words).fold(Told::NOTHING, |told, field| told.and(Told::of(&[field])))
@@ -157,14 +159,14 @@ pub const OFFSET_M: RangeInclusive<f64> = -10.0..=10.0;
 /// Speeds to the side, m/s. UN R157's cut-ins reach 3 m/s; who follows a trajectory may run aside.
 const ASIDE_MPS: RangeInclusive<f64> = 0.1..=10.0;
 
+/// How long a move to the side may take, s.
+const ASIDE_S: RangeInclusive<f64> = 0.5..=60.0;
+
 /// Time gaps that a vehicle may be told to keep, s: from bumper on bumper to the sight of a town.
 const TIME_GAP_S: RangeInclusive<f64> = 0.1..=10.0;
 
 /// Gaps that a vehicle may be told to keep to the ego vehicle, m.
 const KEEP_M: RangeInclusive<f64> = 0.5..=200.0;
-
-/// How much before the ego vehicle a vehicle may be told to be somewhere, s; below 0 after it.
-const EARLY_S: RangeInclusive<f64> = -30.0..=30.0;
 
 /// Stations of the ego vehicle's route, m.
 const AT_M: RangeInclusive<f64> = 0.0..=1e6;
@@ -181,12 +183,14 @@ pub struct CommandDef {
     pub lane: Option<WordExpr<LaneChoice>>,
     /// m to the left of the middle of its lane.
     pub offset: Option<Expr>,
-    /// m/s; without it the driver moves over as it would by itself.
+    /// m/s, or s; without it the driver moves over as it would by itself.
     pub aside: Option<Expr>,
     /// s; without it as before.
     pub time_gap: Option<Expr>,
     /// The gap to the ego vehicle: m, or s.
     pub keep: Option<Expr>,
+    /// To whom, in place of the ego vehicle.
+    pub to: Option<Who>,
     /// How much before the ego vehicle it is somewhere, s.
     pub early: Option<Expr>,
     /// Where, m along the ego vehicle's route; without it where the two ways cross.
@@ -210,9 +214,12 @@ pub struct Command {
     pub lane: Option<LaneChoice>,
     pub offset_m: Option<f64>,
     pub aside_mps: Option<f64>,
+    pub aside_s: Option<f64>,
     pub time_gap_s: Option<f64>,
     pub keep_m: Option<f64>,
     pub keep_s: Option<f64>,
+    /// To whom, by index in `Space::bearers`; without it to the ego vehicle.
+    pub to: Option<usize>,
     pub early_s: Option<f64>,
     pub at_m: Option<f64>,
     pub reach_m: Option<f64>,
@@ -221,6 +228,25 @@ pub struct Command {
     pub siren: Option<bool>,
     /// Where it goes at the next junction.
     pub turn: Option<Turning>,
+}
+
+/// How somebody moves to the side: by the smooth step of least jerk.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum AsideBy {
+    /// With this greatest speed, m/s.
+    Speed(f64),
+    /// In this time, s.
+    Time(f64),
+}
+
+impl AsideBy {
+    /// How long a move over this way takes, s.
+    pub fn takes_s(self, by_m: f64) -> f64 {
+        match self {
+            AsideBy::Speed(mps) => SMOOTH_STEP_SLOPE_MAX * by_m / mps,
+            AsideBy::Time(takes_s) => takes_s,
+        }
+    }
 }
 
 /// The rules of the road that a vehicle ignores; none by default.
@@ -260,7 +286,7 @@ struct Figure {
     value: fn(&mut Command) -> &mut Option<f64>,
 }
 
-const FIGURES: [Figure; 11] = [
+const FIGURES: [Figure; 12] = [
     Figure {
         field: CommandField::Speed,
         unit: "m/s",
@@ -290,8 +316,16 @@ const FIGURES: [Figure; 11] = [
         unit: "m/s",
         bounds: ASIDE_MPS,
         may_be_left_out: true,
-        written: |def| def.aside.as_ref(),
+        written: |def| def.aside.as_ref().filter(|aside| aside.ty == Type::Quantity(Dimension::SPEED)),
         value: |command| &mut command.aside_mps,
+    },
+    Figure {
+        field: CommandField::Aside,
+        unit: "s",
+        bounds: ASIDE_S,
+        may_be_left_out: true,
+        written: |def| def.aside.as_ref().filter(|aside| aside.ty == Type::Quantity(Dimension::DURATION)),
+        value: |command| &mut command.aside_s,
     },
     Figure {
         field: CommandField::TimeGap,
@@ -368,9 +402,15 @@ impl CommandDef {
 
     /// What it says.
     pub fn told(&self) -> Told {
-        let CommandDef { lane, ignores, siren, turn, continuous, .. } = self;
-        let words =
-            [lane.is_some(), ignores.is_some(), siren.is_some(), turn.is_some(), continuous.is_some()];
+        let CommandDef { lane, ignores, siren, turn, continuous, to, .. } = self;
+        let words = [
+            lane.is_some(),
+            ignores.is_some(),
+            siren.is_some(),
+            turn.is_some(),
+            continuous.is_some(),
+            to.is_some(),
+        ];
         Told::all(self.figures().map(|figure| figure.field), words)
     }
 
@@ -403,6 +443,7 @@ impl CommandDef {
             siren: self.siren.as_ref().map(|siren| evaluate(siren, functions, facts).truth()),
             is_continuous: self.continuous.as_ref().is_some_and(|is| evaluate(is, functions, facts).truth()),
             turn: self.turn.as_ref().map(|turn| turn.word(functions, facts)),
+            to: self.to.map(|to| to.bearer(facts.locals)),
             ..Command::default()
         };
         for Figure { bounds, written, value, .. } in FIGURES {
@@ -467,8 +508,15 @@ impl Command {
     }
 
     fn told(&self) -> Told {
-        let Command { lane, ignores, siren, turn, is_continuous, .. } = *self;
-        let words = [lane.is_some(), ignores.is_some(), siren.is_some(), turn.is_some(), is_continuous];
+        let Command { lane, ignores, siren, turn, is_continuous, to, .. } = *self;
+        let words = [
+            lane.is_some(),
+            ignores.is_some(),
+            siren.is_some(),
+            turn.is_some(),
+            is_continuous,
+            to.is_some(),
+        ];
         let mut command = *self;
         let says = |figure: &Figure| (figure.value)(&mut command).is_some();
         Told::all(FIGURES.into_iter().filter(says).map(|figure| figure.field), words)
@@ -477,6 +525,11 @@ impl Command {
     /// Whether it says where beside the ego vehicle.
     pub fn pursues(&self) -> bool {
         self.keep_m.is_some() || self.keep_s.is_some() || self.early_s.is_some()
+    }
+
+    /// How it moves to the side; `None`: as by itself.
+    pub fn aside(&self) -> Option<AsideBy> {
+        self.aside_mps.map(AsideBy::Speed).or(self.aside_s.map(AsideBy::Time))
     }
 
     /// Whether it says where to the side.

@@ -111,7 +111,11 @@ pub struct MomentFacts {
     pub ego_limit_mps: f64,
     /// Along the route to the next junction: 0 inside one, at most [`JUNCTION_AHEAD_M_MAX`].
     pub ego_junction_ahead_m: f64,
+    /// The same to the end of that junction.
+    pub ego_junction_end_m: f64,
     pub ego_crosswalk_ahead_m: f64,
+    /// Of the route's lane at the ego vehicle.
+    pub ego_lane_width_m: f64,
     pub ego_route_left_m: f64,
     /// Positive to the left of the route.
     pub ego_offset_m: f64,
@@ -119,6 +123,7 @@ pub struct MomentFacts {
     pub ego_front_m: f64,
     pub ego_rear_m: f64,
     pub ego_light: Light,
+    pub ego_light_times: LightTimes,
     pub ego_road: RoadKind,
     /// Where the route goes at the next junction.
     pub ego_turn: Turn,
@@ -129,6 +134,19 @@ pub struct MomentFacts {
     pub nearest_gap_m: f64,
     pub nearest_speed_mps: f64,
     pub elapsed_s: f64,
+}
+
+/// Since when a light has its colour and until when, s: [`SINCE_S_MAX`] without a light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LightTimes {
+    pub since_s: f64,
+    pub left_s: f64,
+}
+
+impl Default for LightTimes {
+    fn default() -> LightTimes {
+        LightTimes { since_s: SINCE_S_MAX, left_s: SINCE_S_MAX }
+    }
 }
 
 /// Stands for a junction that is farther away, and for none at all, m.
@@ -147,10 +165,13 @@ pub struct NpcFacts {
     /// From its front, and from the ego vehicle's, to where their ways cross next.
     pub crossing_ahead_m: f64,
     pub ego_crossing_ahead_m: f64,
+    /// From its front to the end of its lane, at most [`JUNCTION_AHEAD_M_MAX`].
+    pub lane_left_m: f64,
     /// Limit of the lane that it is in.
     pub limit_mps: f64,
     /// The next light on its way; none for who is on foot.
     pub light: Light,
+    pub light_times: LightTimes,
     /// Which of it and the ego vehicle goes first, since one of them came into the other's way.
     pub priority: Priority,
     /// Stations of its ends on the ego vehicle's route.
@@ -352,6 +373,10 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         | Fact::EgoAcceleration
         | Fact::EgoLimit
         | Fact::EgoJunctionAhead
+        | Fact::EgoJunctionEnd
+        | Fact::EgoLaneWidth
+        | Fact::EgoLightSince
+        | Fact::EgoLightLeft
         | Fact::EgoCrosswalkAhead
         | Fact::EgoRouteLeft
         | Fact::EgoOffset
@@ -383,6 +408,9 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         Fact::NpcJunctionAhead => spawn(|spawn| spawn.npc.junction_ahead_m),
         Fact::NpcCrossingAhead => spawn(|spawn| spawn.npc.crossing_ahead_m),
         Fact::NpcEgoCrossingAhead => spawn(|spawn| spawn.npc.ego_crossing_ahead_m),
+        Fact::NpcLaneLeft => spawn(|spawn| spawn.npc.lane_left_m),
+        Fact::NpcLightSince => spawn(|spawn| spawn.npc.light_times.since_s),
+        Fact::NpcLightLeft => spawn(|spawn| spawn.npc.light_times.left_s),
         Fact::NpcLimit => spawn(|spawn| spawn.npc.limit_mps),
         Fact::NpcFront => spawn(|spawn| spawn.npc.front_m),
         Fact::NpcRear => spawn(|spawn| spawn.npc.rear_m),
@@ -421,6 +449,10 @@ pub(crate) fn of_moment(fact: Fact) -> Option<fn(&MomentFacts) -> f64> {
         Fact::EgoAcceleration => |moment| moment.ego_acceleration_mps2,
         Fact::EgoLimit => |moment| moment.ego_limit_mps,
         Fact::EgoJunctionAhead => |moment| moment.ego_junction_ahead_m,
+        Fact::EgoJunctionEnd => |moment| moment.ego_junction_end_m,
+        Fact::EgoLaneWidth => |moment| moment.ego_lane_width_m,
+        Fact::EgoLightSince => |moment| moment.ego_light_times.since_s,
+        Fact::EgoLightLeft => |moment| moment.ego_light_times.left_s,
         Fact::EgoCrosswalkAhead => |moment| moment.ego_crosswalk_ahead_m,
         Fact::EgoRouteLeft => |moment| moment.ego_route_left_m,
         Fact::EgoOffset => |moment| moment.ego_offset_m,

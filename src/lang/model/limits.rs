@@ -33,6 +33,9 @@ pub const MEET: RangeInclusive<f64> = 0.0..=1.0;
 /// Times for which somebody may wait at the kerb, s.
 pub const WAITS_S: RangeInclusive<f64> = 0.0..=600.0;
 
+/// How much before the ego vehicle a road user may be asked to be somewhere, s; below 0 after it.
+pub const EARLY_S: RangeInclusive<f64> = -30.0..=30.0;
+
 /// Offsets at which the cycle of the signals may begin, s.
 pub const SIGNAL_PHASE_S: RangeInclusive<f64> = 0.0..=3600.0;
 
@@ -66,19 +69,21 @@ pub struct SpawnFigures {
     pub offset_m: f64,
     pub meet: Option<f64>,
     pub waits_s: Option<f64>,
+    pub early_s: Option<f64>,
 }
 
 impl SpawnFigures {
     /// Why the world must not be asked for a spawn with them, whatever the rules say; `None` if it may. NaN is out of bounds,
     /// too.
     pub fn out_of_bounds(self) -> Option<String> {
-        let SpawnFigures { speed_mps, distance_m, offset_m, meet, waits_s } = self;
+        let SpawnFigures { speed_mps, distance_m, offset_m, meet, waits_s, early_s } = self;
         let figures = [
             Some(("speed", speed_mps, "m/s", SPAWN_SPEED_MPS)),
             Some(("distance", distance_m, "m", SPAWN_DISTANCE_M)),
             Some(("offset", offset_m, "m", OFFSET_M)),
             meet.map(|part| ("meet", part, "", MEET)),
             waits_s.map(|waits_s| ("wait", waits_s, "s", WAITS_S)),
+            early_s.map(|early_s| ("early", early_s, "s", EARLY_S)),
         ];
         out_of_bounds("spawn", figures.into_iter().flatten())
     }

@@ -24,17 +24,18 @@ pub mod rules;
 pub mod scenario;
 mod sliding;
 mod space;
+mod trajectory;
 mod value;
 pub mod vocabulary;
 
 pub use digest::{digest, digest_text};
 pub use eval::{
     CROSSWALK_GAP_M_MAX, Facts, JUNCTION_AHEAD_M_MAX, LEAD_GAP_M_MAX, MomentFacts, NearFacts, NpcFacts,
-    OutcomeFacts, SINCE_S_MAX, SpawnFacts, TIME_S_MAX, TickFacts, WorldFacts, evaluate,
+    LightTimes, OutcomeFacts, SINCE_S_MAX, SpawnFacts, TIME_S_MAX, TickFacts, WorldFacts, evaluate,
 };
 pub use interval::{End, Interval};
 pub use limits::{
-    AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, LIMIT_PART_MAX, MEET, REPEAT, SIGNAL_PHASE_S,
+    AMBIENT_MAX, COMMANDED_MAX, EARLY_S, EGO_ACCELERATION_MPS2_MAX, LIMIT_PART_MAX, MEET, REPEAT, SIGNAL_PHASE_S,
     SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, SpawnFigures, TICK_MS, WAITS_S,
     rounded_into,
 };
@@ -53,10 +54,11 @@ pub use scenario::{
 pub use sliding::Sliding;
 pub use space::{
     ACTION_ODDS_MAX, ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef,
-    GroupDef, Initial, ManoeuvreCall, ManoeuvreDef, OrderDef, Parameter, PhaseDef, RequirementDef,
+    GroupDef, InRow, Initial, ManoeuvreCall, ManoeuvreDef, OrderDef, Parameter, PhaseDef, RequirementDef,
     RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef, StateDef,
-    StateMeaning, Trajectory, TrajectoryDef, VerdictDef, WordExpr, reached, told,
+    StateMeaning, VerdictDef, WordExpr, reached, told,
 };
+pub use trajectory::{BesideRoute, Laid, Trajectory, TrajectoryDef, WayPoint, through};
 pub(crate) use value::STATE_MAX;
 pub use value::{EnumIndex, Memory, Type, Value};
 pub use vocabulary::{Avoidability, ObstacleKind};

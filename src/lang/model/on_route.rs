@@ -24,6 +24,8 @@ pub struct OnRoute {
     pub limit_mps: f64,
     /// Along the route to the next junction, m: 0 in one, [`JUNCTION_AHEAD_M_MAX`] if there is none nearer.
     pub junction_ahead_m: f64,
+    /// Along the route to the end of that junction, m; [`JUNCTION_AHEAD_M_MAX`] if there is none nearer.
+    pub junction_end_m: f64,
     /// Along the route to the goal, m.
     pub route_left_m: f64,
     /// The next traffic light within reach, by index in `RoadMap::signals`.
@@ -50,10 +52,14 @@ impl OnRoute {
         let ahead = route.lanes[first..].iter().map(|RouteLane { lane, enter_m, .. }| (*lane, *enter_m));
         let reach = station_m..=station_m + LIGHT_AHEAD_M;
         let line = route.stop_lines.iter().find(|line| reach.contains(&line.station_m));
-        let (junction_ahead_m, turn) = junction_ahead(map, ahead, station_m);
+        let (junction_ahead_m, turn) = junction_ahead(map, ahead.clone(), station_m);
+        let inside = ahead.skip_while(|(lane, _)| map.lane(*lane).junction.is_none());
+        let mut behind = inside.skip_while(|(lane, _)| map.lane(*lane).junction.is_some());
+        let end_m = behind.next().map_or(JUNCTION_AHEAD_M_MAX, |(_, enter_m)| enter_m - station_m);
         OnRoute {
             limit_mps: map.lane(route.lanes[first].lane).speed_limit_mps,
             junction_ahead_m,
+            junction_end_m: end_m.min(JUNCTION_AHEAD_M_MAX),
             turn,
             route_left_m: route.goal_m - station_m,
             signal: line.map(|line| line.signal),
@@ -126,7 +132,7 @@ pub(crate) fn stretches(map: &RoadMap, route: &Route) -> Vec<Stretch> {
 /// What is known between two stations, between which nothing changes but the distances.
 fn stretch(map: &RoadMap, route: &Route, from_m: f64, to_m: f64) -> Stretch {
     let (middle_m, half_m) = ((from_m + to_m) / 2.0, (to_m - from_m) / 2.0);
-    let OnRoute { limit_mps, junction_ahead_m, route_left_m, signal, road, turn } =
+    let OnRoute { limit_mps, junction_ahead_m, route_left_m, signal, road, turn, .. } =
         OnRoute::at(map, route, middle_m);
     let around = |value_m: f64, low_m: f64, high_m: f64| {
         (value_m - half_m).clamp(low_m, high_m)..=(value_m + half_m).clamp(low_m, high_m)

@@ -13,12 +13,12 @@ use crate::model::meaning::Meaning;
 use crate::model::on_route::Stretch;
 use crate::model::row::Row;
 use crate::model::rules::{Bound, Clause};
+use crate::model::trajectory::{Laid, TrajectoryDef};
 use crate::model::value::{EnumIndex, Type, Value};
 use crate::model::vocabulary::{
     Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, TrafficRule, Turning, Verb, Word,
 };
-use crate::syntax::ast::{Block, Span};
-use avastra_base::geometry::Path;
+use crate::syntax::ast::Span;
 use avastra_base::units::{
     Dimension, Rational, Unit, decimal, quantity, quantity_in, quantity_short, unit_of_all,
 };
@@ -126,45 +126,6 @@ pub struct BodyDef {
     pub like: Body,
     pub shape: BodyParameters,
     pub span: Span,
-}
-
-/// A way in a map that a road user may follow. Its course on the map of a road is in [`Road::trajectories`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct TrajectoryDef {
-    pub name: String,
-    pub docs: Vec<String>,
-    pub declared: Block,
-}
-
-/// A way in the plane that a road user may follow.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Trajectory {
-    pub path: Path,
-    /// Height of the road at each vertex of the path, m.
-    pub heights_m: Vec<f64>,
-    /// How far one is turned to the left of the way at some stations, m and rad; empty if nowhere.
-    pub turns: Vec<(f64, f64)>,
-}
-
-impl Trajectory {
-    /// Height of the road at a station, m.
-    pub fn height_at(&self, station_m: f64) -> f64 {
-        let (segment, part) = self.path.locate(station_m);
-        let (from_m, to_m) = (self.heights_m[segment], self.heights_m[segment + 1]);
-        from_m + (to_m - from_m) * part
-    }
-
-    /// How far one is turned to the left of the way at a station, rad.
-    pub fn turned_rad(&self, station_m: f64) -> f64 {
-        let next = self.turns.partition_point(|(at_m, _)| *at_m < station_m);
-        match (next.checked_sub(1).and_then(|before| self.turns.get(before)), self.turns.get(next)) {
-            (Some((from_m, from_rad)), Some((to_m, to_rad))) => {
-                from_rad + (to_rad - from_rad) * (station_m - from_m) / (to_m - from_m)
-            }
-            (Some((_, turn_rad)), None) | (None, Some((_, turn_rad))) => *turn_rad,
-            (None, None) => 0.0,
-        }
-    }
 }
 
 /// What a spawn calls a body: one of the engine, or one of the author's own that is like it.
@@ -367,7 +328,8 @@ pub struct SpawnDef {
     pub behind: bool,
     /// The road user from which the distance is measured, in place of the ego vehicle.
     pub of: Option<Who>,
-    /// The trajectory on which it begins, by index in `Space::trajectories`; the distance is then its station there.
+    /// The trajectory that it follows, by index in `Space::trajectories`. The distance is then its station there, of one that
+    /// lies beside the route where that begins.
     pub trajectory: Option<WordExpr<usize>>,
     /// The parked vehicle from behind which a pedestrian steps.
     pub cover: Option<WordExpr<BodyWord>>,
@@ -378,14 +340,16 @@ pub struct SpawnDef {
     pub meet: Option<Expr>,
     /// How long it stands at the kerb, s; without it it sets out so as to meet the ego vehicle.
     pub waits: Option<Expr>,
+    /// How much before the ego vehicle it is where it crosses its way, s, if that one keeps its speed; without it when a driver
+    /// like that of the route's limits arrives there.
+    pub early: Option<Expr>,
     /// Whether it is an emergency vehicle under way.
     pub siren: Option<Expr>,
     pub turn: Option<WordExpr<Turning>>,
     /// The name that it bears from then on, by index in `Space::bearers`.
     pub bearer: Option<usize>,
-    /// Its place in a row of road users, from 0 nearest to the ego vehicle, and the gap between them, m; `None` for one
-    /// that is alone or the first.
-    pub row: Option<(usize, Expr)>,
+    /// Its place in a row of road users; `None` for one that is alone or the first.
+    pub row: Option<InRow>,
     /// The manoeuvre that it begins when it appears.
     pub manoeuvre: Option<ManoeuvreCall>,
     pub span: Span,
@@ -465,12 +429,30 @@ pub struct ManoeuvreCall {
     pub arguments: Vec<Expr>,
 }
 
+/// The place of a road user in a row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InRow {
+    /// Behind so many others; the first one, at 0, is nearest to the ego vehicle.
+    pub nth: usize,
+    /// The gap between them, m.
+    pub apart: Expr,
+    /// How many of the row appear; without it all.
+    pub count: Option<Expr>,
+    /// How many have names.
+    pub named: usize,
+}
+
 impl SpawnDef {
+    /// Whether it appears: of a row only so many may.
+    pub fn appears(&self, functions: &[FnDef], facts: &Facts<'_>) -> bool {
+        let count = |row: &InRow| Some(evaluate(row.count.as_ref()?, functions, facts).number());
+        self.row.as_ref().is_none_or(|row| count(row).is_none_or(|count| (row.nth as f64) < count))
+    }
+
     /// How much farther away it is than the first of its row, m; `length_m` is that of its body.
     pub fn behind_first_m(&self, length_m: f64, functions: &[FnDef], facts: &Facts<'_>) -> f64 {
-        let more_m = |(nth, apart): &(usize, Expr)| {
-            *nth as f64 * (length_m + evaluate(apart, functions, facts).number())
-        };
+        let more_m =
+            |row: &InRow| row.nth as f64 * (length_m + evaluate(&row.apart, functions, facts).number());
         self.row.as_ref().map_or(0.0, more_m)
     }
 }
@@ -625,8 +607,8 @@ pub struct Road {
     pub set_mps: Option<f64>,
     /// When in the signals' cycle an episode begins, s; `None`: by chance.
     pub signal_phase_s: Option<f64>,
-    /// For each trajectory of the space its course; `None` for one that lies on another map.
-    pub trajectories: Vec<Option<Arc<Trajectory>>>,
+    /// Where each trajectory of the space lies; `None` for one on another map.
+    pub trajectories: Vec<Option<Laid>>,
     pub facts: RoadFacts,
 }
 

@@ -237,7 +237,11 @@ facts! {
     EgoAcceleration "ego.acceleration" ACCEL, World = "A `Accel`: of the ego vehicle, negative when it brakes.";
     EgoLimit "ego.limit" SPEED, World = "A `Speed`: the limit of the lane that the ego vehicle is in.";
     EgoJunctionAhead "ego.junction_ahead" LENGTH, World = "A `Length`: along the route to the next junction; 0 in one, 1000 m if there is none nearer.";
+    EgoJunctionEnd "ego.junction_end" LENGTH, World = "A `Length`: along the route to the end of that junction; 1000 m if there is none nearer.";
     EgoCrosswalkAhead "ego.crosswalk_ahead" LENGTH, World = "A `Length`: along the route to the next crosswalk; 0 on one, 1000 m if there is none nearer.";
+    EgoLaneWidth "ego.lane_width" LENGTH, World = "A `Length`: of the route's lane at the ego vehicle.";
+    EgoLightSince "ego.light_since" DURATION, World = "A `Duration`: since when the light of `ego.light` has its colour; 1000 s if there is none.";
+    EgoLightLeft "ego.light_left" DURATION, World = "A `Duration`: until the light of `ego.light` changes; 1000 s if there is none.";
     EgoRouteLeft "ego.route_left" LENGTH, World = "A `Length`: along the route to the goal.";
     EgoOffset "ego.offset" LENGTH, World = "A `Length`: how far the ego vehicle is to the left of its route.";
     EgoFront "ego.front" LENGTH, World = "A `Length`: where the ego vehicle's front is along its route, whose start has 0 m.";
@@ -254,6 +258,9 @@ facts! {
     NpcJunctionAhead "npc.junction_ahead" LENGTH, Spawn = "A `Length`: along its way to the next junction; 0 in one, 1000 m if there is none nearer.";
     NpcCrossingAhead "npc.crossing_ahead" LENGTH, Spawn = "A `Length`: from a vehicle's front to where its way next crosses the ego vehicle's, or joins it; 1000 m if it does not.";
     NpcEgoCrossingAhead "npc.ego_crossing_ahead" LENGTH, Spawn = "A `Length`: from the ego vehicle's front to that place, below 0 behind it; 1000 m if there is none.";
+    NpcLaneLeft "npc.lane_left" LENGTH, Spawn = "A `Length`: from a vehicle's front to where its lane ends beside others that go on; 1000 m if it does not end sooner.";
+    NpcLightSince "npc.light_since" DURATION, Spawn = "A `Duration`: since when the light of `npc.light` has its colour; 1000 s if there is none.";
+    NpcLightLeft "npc.light_left" DURATION, Spawn = "A `Duration`: until the light of `npc.light` changes; 1000 s if there is none.";
     NpcLimit "npc.limit" SPEED, Spawn = "A `Speed`: the limit of the lane in which it appears.";
     NpcFront "npc.front" LENGTH, Spawn = "A `Length`: its end that is farthest along the ego vehicle's route.";
     NpcRear "npc.rear" LENGTH, Spawn = "A `Length`: its end that is least far along the ego vehicle's route.";
@@ -445,13 +452,14 @@ words! {
     TrajectoryField "A field of `trajectory`.":
     Road "road" = "The road on whose map it lies: `road: corner`.",
     Lanes "lanes" = "Places between which it follows the lanes: `lanes: [lane 1/-1 at 12 m, lane 7/-1 at 80 m]`.",
-    Points "points" = "Places between which it runs straight: `points: [{ at: lane 1/-1 at 40 m, offset: -4 m }, { x: 12 m, y: 3 m }]`.",
+    Points "points" = "Places between which it runs straight: `points: [{ at: lane 1/-1 at 40 m, offset: -4 m }, { x: 12 m, y: 3 m }]`; without a `road` places beside the ego vehicle's route, through which it leads in a curve: `points: [{ along: 0 m, offset: -3 m }, { along: 15 m }]`.",
 }
 
 words! {
     PointField "A field of a point of a `trajectory`.":
     At "at" = "A place on a lane: `at: lane 1/-1 at 40 m`.",
-    Offset "offset" = "How far to the left of the middle of that lane; negative to the right.",
+    Offset "offset" = "How far to the left of the middle of that lane, or of the ego vehicle's route; negative to the right.",
+    Along "along" = "How far along the ego vehicle's route from where the way begins: `{ along: 12 m, offset: -3 m }`.",
     X "x" = "Where it is on the map, with `y`: `{ x: 12 m, y: -3.5 m }`.",
     Y "y" = "Where it is on the map, with `x`.",
     Turned "turned" = "How far who comes there is turned to the left of the way, as in a skid; in between it changes evenly.",
@@ -477,9 +485,11 @@ words! {
     Then "then" = "Whether it keeps its lane or changes it: `Keep` or `Change`.",
     Speed "speed" = "How fast it is.",
     Offset "offset" = "How far to the left of its lane's middle it is; negative to the right.",
+    Count "count" = "How many of a row appear, from the first name on: `count: 2`.",
     Ignores "ignores" = "The rules of the road that it ignores: `ignores: [Signals]`.",
     Siren "siren" = "Whether it is an emergency vehicle under way, for which all others wait: `siren: true`.",
     Turn "turn" = "Where it goes at the next junction: `Left`, `Straight` or `Right`.",
+    Early "early" = "How much before the ego vehicle it is where the two ways cross, if that one keeps its speed: `early: 0.5 s`.",
     Waits "waits" = "How long it stands at the kerb before it sets out: `waits: 2 s`.",
     Meet "meet" = "The part of the ego vehicle's front at which it is met, from the side that it comes from: `meet: 25 %`.",
     Colour "colour" = "Its paint.",
@@ -492,9 +502,10 @@ words! {
     Continuous "continuous" = "Whether the `speed` of a phase is asked anew at every tick, until another one is told: `continuous: true`.",
     Lane "lane" = "The lane that it changes to, seen from the ego vehicle: `Left`, `Current` or `Right`.",
     Offset "offset" = "How far to the left of its lane's middle it drives from then on; negative to the right.",
-    Aside "aside" = "Its greatest speed to the side on the way there, as far as the road allows.",
+    Aside "aside" = "Its greatest speed to the side on the way there, or how long the move takes, as far as the road allows: `aside: 1.5 m/s`, `aside: 3 s`.",
     TimeGap "time_gap" = "The time gap that its driver keeps behind whoever is ahead of it.",
     Keep "keep" = "The gap that it keeps to the ego vehicle, ahead of it or behind it: `keep: 1.5 s`, `keep: 20 m`.",
+    To "to" = "The road user to which it keeps that gap, in place of the ego vehicle: `keep: 20 m, to: truck`.",
     Early "early" = "How much before the ego vehicle it is where the two ways cross, or `at` a station: `early: 1 s`.",
     At "at" = "The station of the ego vehicle's route at which it is `early`: `at: van.rear`.",
     Reach "reach" = "Where on its own trajectory it is `early`, for who does `Follow`: `reach: 30 m`.",

@@ -299,7 +299,11 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         Fact::EgoJunctionAhead
         | Fact::EgoCrosswalkAhead
         | Fact::NpcJunctionAhead
-        | Fact::NpcCrossingAhead => between(0.0, JUNCTION_AHEAD_M_MAX),
+        | Fact::NpcCrossingAhead
+        | Fact::EgoJunctionEnd => between(0.0, JUNCTION_AHEAD_M_MAX),
+        Fact::EgoLightSince | Fact::EgoLightLeft | Fact::NpcLightSince | Fact::NpcLightLeft => {
+            between(0.0, SINCE_S_MAX)
+        }
         Fact::NpcTtc | Fact::NpcHeadway | Fact::NpcContactIn | Fact::NpcPet => between(0.0, TIME_S_MAX),
         Fact::EgoOffset
         | Fact::EgoRouteLeft
@@ -315,6 +319,7 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         | Fact::EgoLaneOffset
         | Fact::EgoOverCrosswalk
         | Fact::NpcLanesLeft
+        | Fact::NpcLaneLeft
         | Fact::NpcOffRoad
         | Fact::EgoOverLine
         | Fact::NpcAlong
@@ -332,6 +337,7 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         Fact::RoadUsers | Fact::RuleBreakers => between(0.0, f64::from(COMMANDED_MAX + AMBIENT_MAX)),
         Fact::RoadLimit
         | Fact::EgoLimit
+        | Fact::EgoLaneWidth
         | Fact::NearestGap
         | Fact::NearestSpeed
         | Fact::Elapsed

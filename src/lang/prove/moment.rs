@@ -124,7 +124,18 @@ const NO_ROAD_USER_M: i64 = 100;
 /// without newcomers, that of the moment. The world lets nothing appear faster than it was asked to be. Where `lands` is set, it also appears at the distance that was asked for, as far as its verb means a place on
 /// the route: so it is where the road is straight and free.
 pub(super) fn newcomers(action: &ActionDef, known: &Known<'_>, lands: bool) -> Vec<Case> {
-    let newcomers: Vec<Case> = action.spawns().map(|spawn| newcomer(spawn, known, lands)).collect();
+    // Of those who may be missing nothing is known.
+    let surely_appears = |spawn: &&SpawnDef| {
+        spawn.row.as_ref().is_none_or(|row| {
+            let least = |count: &Expr| enclose(count, known).interval().low;
+            row.count.as_ref().is_none_or(|count| match least(count) {
+                End::At(least, _) => least.to_f64() > row.nth as f64,
+                End::Unbounded => false,
+            })
+        })
+    };
+    let newcomers: Vec<Case> =
+        action.spawns().filter(surely_appears).map(|spawn| newcomer(spawn, known, lands)).collect();
     match newcomers.is_empty() {
         true => vec![known.case.cloned().unwrap_or_default()],
         false => newcomers,

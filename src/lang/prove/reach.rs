@@ -131,7 +131,9 @@ fn deciding_axes(space: &Space, action: usize) -> Vec<usize> {
     let definition = &space.actions[action];
     let of_spawns = definition.spawns().flat_map(|spawn| {
         let verb = spawn.verb.expr();
-        [&spawn.speed, &spawn.distance].into_iter().chain(&spawn.offset).chain(verb).flat_map(rules::locals)
+        let count = spawn.row.as_ref().and_then(|row| row.count.as_ref());
+        let exprs = [&spawn.speed, &spawn.distance].into_iter().chain(&spawn.offset).chain(verb).chain(count);
+        exprs.flat_map(rules::locals)
     });
     let of_spawns: Vec<usize> = of_spawns.collect();
     let decides = |local: &usize| {

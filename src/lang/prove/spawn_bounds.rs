@@ -7,7 +7,7 @@ use crate::model::command::OFFSET_M;
 use crate::model::expr::ExprKind;
 use crate::model::vocabulary::{CommandField, Word};
 use crate::model::{
-    ACTION_ODDS_MAX, ActionDef, Interval, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, Type, WAITS_S,
+    ACTION_ODDS_MAX, ActionDef, EARLY_S, Interval, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, Type, WAITS_S,
     code, effort,
 };
 use crate::prove::enclose::{Known, enclose};
@@ -62,17 +62,16 @@ pub(crate) fn is_out(space: &Space, action: usize) -> bool {
 
 fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
     let of_spawns = space.actions[action].spawns().flat_map(|spawn| {
+        let second = || spawn.row.as_ref().filter(|row| row.nth == 1);
         [
             Some(("speed", "a spawn", "m/s", &spawn.speed, SPAWN_SPEED_MPS)),
             Some(("distance", "a spawn", "m", &spawn.distance, SPAWN_DISTANCE_M)),
             spawn.offset.as_ref().map(|offset| ("offset", "a spawn", "m", offset, OFFSET_M)),
             spawn.meet.as_ref().map(|meet| ("meet", "a spawn", "", meet, MEET)),
             spawn.waits.as_ref().map(|waits| ("wait", "a spawn", "s", waits, WAITS_S)),
-            spawn
-                .row
-                .as_ref()
-                .filter(|(nth, _)| *nth == 1)
-                .map(|(_, apart)| ("gap", "a row", "m", apart, SPAWN_DISTANCE_M)),
+            spawn.early.as_ref().map(|early| ("early", "a spawn", "s", early, EARLY_S)),
+            second().map(|row| ("gap", "a row", "m", &row.apart, SPAWN_DISTANCE_M)),
+            second().and_then(|row| Some(("count", "a row", "", row.count.as_ref()?, 1.0..=row.named as f64))),
         ]
     });
     let of_spawns = of_spawns.flatten();

@@ -131,8 +131,9 @@ impl<'a> RowText<'a> {
                 let ignores = ignores.map(|ignores| ignored_form(ignores, &|expr| self.reduced(expr)));
                 let turn =
                     order.command.turn.as_ref().map(|turn| word_form(turn, &|expr| self.reduced(expr)));
+                let to = order.command.to.map(|to| reduced_who(to, &self.locals));
                 format!(
-                    "order {:?} {figures:?} {lane:?} {ignores:?} {siren:?} {turn:?} {then:?}",
+                    "order {:?} {figures:?} {to:?} {lane:?} {ignores:?} {siren:?} {turn:?} {then:?}",
                     reduced_who(order.who, &self.locals)
                 )
             }
@@ -188,7 +189,7 @@ fn ignored_form(ignores: &[WordExpr<TrafficRule>], reduced: &impl Fn(&Expr) -> E
 
 fn spawn_form(spawn: &SpawnDef, locals: &[Expr], reduced: &impl Fn(&Expr) -> Expr) -> String {
     format!(
-        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {} {} {:?} {} {:?} {:?} {:?}",
+        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {} {} {:?} {} {:?} {:?} {:?} {:?}",
         word_form(&spawn.body, reduced),
         word_form(&spawn.colour, reduced),
         word_form(&spawn.verb, reduced),
@@ -208,7 +209,10 @@ fn spawn_form(spawn: &SpawnDef, locals: &[Expr], reduced: &impl Fn(&Expr) -> Exp
         spawn.cover.as_ref().map_or(String::new(), |cover| word_form(cover, reduced)),
         spawn.trajectory.as_ref().map(|trajectory| word_form(trajectory, reduced)),
         spawn.bearer,
-        spawn.row.as_ref().map(|(nth, apart)| (nth, reduced(apart).kind)),
+        spawn.early.as_ref().map(|early| reduced(early).kind),
+        spawn.row.as_ref().map(|row| {
+            (row.nth, reduced(&row.apart).kind, row.count.as_ref().map(|count| reduced(count).kind))
+        }),
     )
 }
 

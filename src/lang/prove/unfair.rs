@@ -44,12 +44,14 @@ fn unfair(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef, left: &Left) 
     let in_force = RulesInForce::by_default(space);
     let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
     let asks = |demand| matches!(demand, Demand::Holds(condition) if condition.known() > Known::Road);
-    if spawn.offset.is_some() || spawn.of.is_some() || rules.demands().any(|(_, demand)| asks(demand)) {
+    let is_elsewhere = spawn.offset.is_some() || spawn.of.is_some() || spawn.trajectory.is_some();
+    if is_elsewhere || rules.demands().any(|(_, demand)| asks(demand)) {
         return None;
     }
     Search { rules, left, moment: None }.find(&|values, memory| {
+        let facts = Facts { road: Some(&road.facts), ..Facts::new(values, memory) };
         let figures = figures(space, road, spawn, values, memory);
-        figures.needed_m > figures.distance_m + MARGIN_M
+        spawn.appears(&space.functions, &facts) && figures.needed_m > figures.distance_m + MARGIN_M
     })
 }
 

@@ -301,7 +301,7 @@ impl Search<'_> {
         let facts = Facts { road: self.rules.road, ..Facts::new(values, after) };
         let number = |expr: &Expr| evaluate(expr, &space.functions, &facts).number();
         let mut spawns = Vec::new();
-        for spawn in action.spawns() {
+        for spawn in action.spawns().filter(|spawn| spawn.appears(&space.functions, &facts)) {
             let speed_mps = rounded_into(number(&spawn.speed), SPAWN_SPEED_MPS);
             let body = spawn.body.word(&space.functions, &facts);
             let shape = body.own.map_or_else(|| parameters(body.like), |own| space.bodies[own].shape);
@@ -312,9 +312,10 @@ impl Search<'_> {
             if figures.out_of_bounds().is_some() {
                 return false;
             }
-            // The spawn lands where it was asked to, and no gap is unfair. Where somebody else is that it is asked for beside,
-            // nobody knows here.
-            let spawn_gap_m = if spawn.of.is_some() { f64::INFINITY } else { distance_m };
+            // The spawn lands where it was asked to, and no gap is unfair. How far away somebody else is beside whom it is asked
+            // for, or a trajectory, nobody knows here.
+            let is_elsewhere = spawn.of.is_some() || spawn.trajectory.is_some();
+            let spawn_gap_m = if is_elsewhere { f64::INFINITY } else { distance_m };
             spawns.push(SpawnFacts { spawn_gap_m, ..SpawnFacts::default() });
         }
         let world = WorldFacts { spawns, ..WorldFacts::default() };
@@ -420,7 +421,8 @@ impl Search<'_> {
             set.key.iter().chain([&set.value]).for_each(&mut named);
         }
         for spawn in self.action().spawns() {
-            [&spawn.speed, &spawn.distance].into_iter().chain(&spawn.offset).for_each(&mut named);
+            let count = spawn.row.as_ref().and_then(|row| row.count.as_ref());
+            [&spawn.speed, &spawn.distance].into_iter().chain(&spawn.offset).chain(count).for_each(&mut named);
         }
         for (_, demand) in self.rules.demands() {
             match demand {

@@ -369,13 +369,19 @@ pub enum Place {
     Behind,
     /// From the beginning of a trajectory.
     On(Box<Expr>),
+    /// On a trajectory that lies beside the ego vehicle's route, ahead of it or behind it.
+    Along { trajectory: Box<Expr>, behind: bool },
 }
 
 impl Place {
+    pub fn is_behind(&self) -> bool {
+        matches!(self, Place::Behind | Place::Along { behind: true, .. })
+    }
+
     /// The trajectory, if there is one.
     pub fn trajectory(&self) -> Option<&Expr> {
         match self {
-            Place::On(trajectory) => Some(trajectory),
+            Place::On(trajectory) | Place::Along { trajectory, .. } => Some(trajectory),
             Place::Ahead | Place::Behind => None,
         }
     }

@@ -331,6 +331,11 @@ impl Builder {
             let place = match place.as_rule() {
                 Rule::kw_ahead => Place::Ahead,
                 Rule::on_trajectory => Place::On(Box::new(self.only_expression(place)?)),
+                Rule::along_trajectory => {
+                    let mut parts = Parts::of(place);
+                    let trajectory = Box::new(self.expression(parts.next())?);
+                    Place::Along { trajectory, behind: parts.take(Rule::kw_behind).is_some() }
+                }
                 _ => Place::Behind,
             };
             let distance = self.expression(parts.next())?;

@@ -128,7 +128,7 @@ pub fn role(rule: Rule) -> Role {
         Rule::kw_repeat | Rule::repeat => Role::Said("`repeat`"),
         Rule::kw_as | Rule::bearer => Role::Said("`as`"),
         Rule::kw_of | Rule::of_whom => Role::Said("`of`"),
-        Rule::on_trajectory => Role::Said("`on`"),
+        Rule::on_trajectory | Rule::along_trajectory => Role::Said("`on`"),
         Rule::kw_apart | Rule::apart => Role::Said("`apart`"),
         Rule::kw_order => Role::Said("`order`"),
         Rule::kw_ahead => Role::Said("`ahead`"),

@@ -688,6 +688,10 @@ fn effect(effect: &Effect) -> Layout {
                 Place::On(trajectory) => {
                     parts.extend([Layout::text(" on "), expression(trajectory), Layout::text(" at ")]);
                 }
+                Place::Along { trajectory, behind } => {
+                    let side = if *behind { " behind " } else { " ahead " };
+                    parts.extend([Layout::text(" on "), expression(trajectory), Layout::text(side)]);
+                }
             }
             parts.push(expression(distance));
             if let Some(of) = of {

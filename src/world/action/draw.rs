@@ -6,7 +6,8 @@ use std::sync::Arc;
 use crate::action::course::Part;
 use crate::action::later::Later;
 use crate::action::table::{Draw, Refusal, Situation};
-use crate::action::{Course, Effect, LaneChangeRules, OrderRequest, SpawnRequest};
+use crate::action::{Course, Effect, LaneChangeRules, OnTrajectory, OrderRequest, SpawnRequest};
+use crate::sim::VehicleParameters;
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::body::{OwnBody, parameters};
@@ -17,7 +18,7 @@ use avastra_lang::model::rules::{
 };
 use avastra_lang::model::vocabulary::Verb;
 use avastra_lang::model::{
-    ActionDef, BodyWord, Domain, EffectDef, Facts, MEET, ManoeuvreCall, Memory, MomentFacts, NpcFacts,
+    ActionDef, BodyWord, Domain, EARLY_S, EffectDef, Facts, MEET, ManoeuvreCall, Memory, MomentFacts, NpcFacts,
     OrderDef, Parameter, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WAITS_S,
     WorldFacts, evaluate, locals, reached, rounded_into, told,
 };
@@ -157,7 +158,10 @@ impl<'a> Judge<'a> {
         let mut effects = self.effects(values, &after);
         let mut refusals = Vec::new();
         let mut spawns = Vec::new();
-        let mut spawn_defs = self.action.spawns();
+        let mut spawn_defs = self.happening(values, &after).filter_map(|effect| match effect {
+            EffectDef::Spawn(spawn) => Some(spawn),
+            EffectDef::Set(_) | EffectDef::Order(_) => None,
+        });
         for (nth, effect) in effects.iter().enumerate() {
             if refusals.len() >= refusals_max {
                 return Err(refusals);
@@ -191,6 +195,7 @@ impl<'a> Judge<'a> {
                 Err(reason) => refusals.push(refuse(None, format!("cannot spawn: {reason}"))),
             }
         }
+        drop(spawn_defs);
         let world = WorldFacts { spawns, ..self.world() };
         let candidate = Candidate { values, before, after: &after, world: Some(&world) };
         let breaches = self.row.breaches(candidate).take(refusals_max.saturating_sub(refusals.len()));
@@ -226,7 +231,7 @@ impl<'a> Judge<'a> {
     fn courses(&self, values: &[Value], after: &Memory, effects: &[Effect]) -> Vec<(usize, Arc<Course>)> {
         let of_road_users = |effect: &Effect| matches!(effect, Effect::Spawn(_) | Effect::Order(_));
         let places = effects.iter().enumerate().filter(|(_, effect)| of_road_users(effect)).map(|(at, _)| at);
-        let calls = self.action.effects.iter().filter_map(|effect| match effect {
+        let calls = self.happening(values, after).filter_map(|effect| match effect {
             EffectDef::Set(_) => None,
             EffectDef::Spawn(spawn) => Some(spawn.manoeuvre.as_ref()),
             EffectDef::Order(order) => Some(order.manoeuvre.as_ref()),
@@ -263,11 +268,21 @@ impl<'a> Judge<'a> {
         Facts { road: self.row.road, ..Facts::new(values, memory) }
     }
 
+    /// The effects of the action, without the spawns of which a row has fewer.
+    fn happening<'f>(&'f self, values: &'f [Value], after: &'f Memory) -> impl Iterator<Item = &'f EffectDef> {
+        self.action.effects.iter().filter(move |effect| match effect {
+            EffectDef::Spawn(spawn) => {
+                spawn.appears(&self.row.space.functions, &self.facts(values, after))
+            }
+            EffectDef::Set(_) | EffectDef::Order(_) => true,
+        })
+    }
+
     /// The changes of the world. They carry the values of the memory after the action, so that world and
     /// memory agree.
     fn effects(&self, locals: &[Value], after: &Memory) -> Vec<Effect> {
         let mut effects = Vec::new();
-        for effect in &self.action.effects {
+        for effect in self.happening(locals, after) {
             match effect {
                 EffectDef::Set(set) => {
                     let state = &self.row.space.states[set.state];
@@ -311,6 +326,22 @@ impl<'a> Judge<'a> {
         }
     }
 
+    /// How far before the ego vehicle's front a way beside its route begins, m: NaN if it begins beside somebody who is not there.
+    fn begins_m(&self, spawn: &SpawnDef, distance_m: f64, locals: &[Value]) -> f64 {
+        let ego_front_m = self.moment.ego_front_m;
+        let (front_m, rear_m) = match spawn.of {
+            // The moment may not have been asked for.
+            None => (0.0, -VehicleParameters::MKZ.length_m),
+            Some(of) => {
+                let who = of.bearer(locals);
+                let known = self.bearers.iter().find(|(known, _)| *known == who);
+                let known = known.map(|(_, npc)| (npc.front_m - ego_front_m, npc.rear_m - ego_front_m));
+                known.unwrap_or((f64::NAN, f64::NAN))
+            }
+        };
+        if spawn.behind { rear_m - distance_m } else { front_m + distance_m }
+    }
+
     fn request(&self, spawn: &SpawnDef, locals: &[Value], after: &Memory) -> SpawnRequest {
         let functions = &self.row.space.functions;
         let facts = self.facts(locals, after);
@@ -322,9 +353,17 @@ impl<'a> Judge<'a> {
         let cover = spawn.cover.as_ref().map(|cover| cover.word(functions, &facts));
         // The bodies of a row are all of one kind.
         let shape = own(body).map_or_else(|| parameters(body.like), |own| own.shape);
-        let before_m = spawn.behind_first_m(shape.length_m, functions, &facts);
-        let asked_m = evaluate(&spawn.distance, functions, &facts).number() + before_m;
         let verb = spawn.verb.word(functions, &facts);
+        let behind_first_m = spawn.behind_first_m(shape.length_m, functions, &facts);
+        // Those who cross come one after the other to where the first meets the ego vehicle.
+        let (asked_m, behind_first_m) = match (evaluate(&spawn.distance, functions, &facts).number(), verb) {
+            (asked_m, Verb::CrossRoad) => (asked_m, behind_first_m),
+            (asked_m, _) => (asked_m + behind_first_m, 0.0),
+        };
+        let trajectory = spawn.trajectory.as_ref().map(|one| one.word(functions, &facts));
+        let is_beside_route = |index: usize| self.row.space.trajectories[index].is_beside_route();
+        let begins_m =
+            trajectory.filter(|index| is_beside_route(*index)).map(|_| self.begins_m(spawn, asked_m, locals));
         SpawnRequest {
             body: body.like,
             own: own(body),
@@ -336,6 +375,7 @@ impl<'a> Judge<'a> {
             then: spawn.then.word(functions, &facts),
             speed_mps: rounded_into(evaluate(&spawn.speed, functions, &facts).number(), SPAWN_SPEED_MPS),
             distance_m: match spawn.of {
+                _ if begins_m.is_some() => 0.0,
                 None => rounded_into(asked_m, SPAWN_DISTANCE_M),
                 Some(of) => self.beside_m(of, spawn, asked_m, shape.length_m, verb, locals),
             },
@@ -349,13 +389,18 @@ impl<'a> Judge<'a> {
                 .meet
                 .as_ref()
                 .map(|meet| rounded_into(evaluate(meet, functions, &facts).number(), MEET)),
+            early_s: spawn
+                .early
+                .as_ref()
+                .map(|early| rounded_into(evaluate(early, functions, &facts).number(), EARLY_S)),
             waits_s: spawn
                 .waits
                 .as_ref()
                 .map(|waits| rounded_into(evaluate(waits, functions, &facts).number(), WAITS_S)),
             siren: spawn.siren.as_ref().is_some_and(|siren| evaluate(siren, functions, &facts).truth()),
             turn: spawn.turn.as_ref().map(|turn| turn.word(functions, &facts)),
-            trajectory: spawn.trajectory.as_ref().map(|one| one.word(functions, &facts)),
+            trajectory: trajectory.map(|index| OnTrajectory { index, begins_m }),
+            behind_first_m,
             bearer: spawn.bearer,
         }
     }

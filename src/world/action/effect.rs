@@ -70,20 +70,34 @@ pub struct SpawnRequest {
     /// How long it stands at the kerb before it sets out, s; for `Walk` alone. Without it it sets out so as to meet the ego
     /// vehicle.
     pub waits_s: Option<f64>,
+    /// How much before the ego vehicle it is where it crosses its way, s, if that one keeps its speed; for `CrossRoad` alone.
+    pub early_s: Option<f64>,
     /// Whether it is an emergency vehicle under way.
     pub siren: bool,
     /// Where it goes at the next junction; with `CrossRoad` at the one where it crosses the ego vehicle's way.
     pub turn: Option<Turning>,
-    /// The trajectory on which it begins, by its index in the space; `distance_m` is then its station there.
-    pub trajectory: Option<usize>,
+    /// The trajectory that it follows; `distance_m` is then its station there.
+    pub trajectory: Option<OnTrajectory>,
+    /// How far it drives behind the first one of its row, m; for `CrossRoad`, where the distance is that of their meeting place.
+    pub behind_first_m: f64,
     /// The name that it bears, by its index in the space.
     pub bearer: Option<usize>,
 }
 
+/// A trajectory that somebody follows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OnTrajectory {
+    /// In the space.
+    pub index: usize,
+    /// Of one that lies beside the ego vehicle's route: how far before the ego vehicle's front it begins there, m; below 0
+    /// behind that. Its station is then 0.
+    pub begins_m: Option<f64>,
+}
+
 impl SpawnRequest {
     pub fn figures(&self) -> SpawnFigures {
-        let SpawnRequest { speed_mps, distance_m, offset_m, meet, waits_s, .. } = *self;
-        SpawnFigures { speed_mps, distance_m, offset_m, meet, waits_s }
+        let SpawnRequest { speed_mps, distance_m, offset_m, meet, waits_s, early_s, .. } = *self;
+        SpawnFigures { speed_mps, distance_m, offset_m, meet, waits_s, early_s }
     }
 }
 

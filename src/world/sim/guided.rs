@@ -6,9 +6,9 @@
 
 use std::sync::Arc;
 
-use avastra_base::geometry::{Pose, SMOOTH_STEP_SLOPE_MAX, smooth_step, unit_vector, wrap_angle};
+use avastra_base::geometry::{Pose, smooth_step, unit_vector, wrap_angle};
 use avastra_lang::model::Trajectory;
-use avastra_lang::model::command::Command;
+use avastra_lang::model::command::{AsideBy, Command};
 
 use super::around::Around;
 use super::body::BodyParameters;
@@ -176,7 +176,7 @@ impl Guided {
         }
         if let Some(to_m) = command.offset_m {
             let by_m = (to_m - self.left_m).abs();
-            let takes_s = SMOOTH_STEP_SLOPE_MAX * by_m / command.aside_mps.unwrap_or(ASIDE_MPS);
+            let takes_s = command.aside().unwrap_or(AsideBy::Speed(ASIDE_MPS)).takes_s(by_m);
             let shift = Shift { from_m: self.left_m, to_m, takes_s, since_s: 0.0 };
             self.shift = (by_m > 0.0).then_some(shift);
         }

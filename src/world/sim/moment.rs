@@ -4,7 +4,8 @@
 use avastra_base::geometry::Vec2;
 use avastra_lang::model::vocabulary::{Fact, Light, Priority, Turn, WordFact};
 use avastra_lang::model::{
-    CROSSWALK_GAP_M_MAX, JUNCTION_AHEAD_M_MAX, LIGHT_AHEAD_M, MomentFacts, NpcFacts, OnRoute, TIME_S_MAX,
+    CROSSWALK_GAP_M_MAX, JUNCTION_AHEAD_M_MAX, LIGHT_AHEAD_M, LightTimes, MomentFacts, NpcFacts, OnRoute,
+    TIME_S_MAX,
     junction_ahead,
 };
 
@@ -41,7 +42,12 @@ impl MomentParts {
         for fact in facts {
             match fact {
                 Fact::EgoLimit => parts.limit = true,
-                Fact::EgoJunctionAhead | Fact::EgoRouteLeft => parts.route = true,
+                Fact::EgoJunctionAhead
+                | Fact::EgoJunctionEnd
+                | Fact::EgoLaneWidth
+                | Fact::EgoLightSince
+                | Fact::EgoLightLeft
+                | Fact::EgoRouteLeft => parts.route = true,
                 Fact::EgoCrosswalkAhead => parts.crosswalks = true,
                 Fact::RoadUsers | Fact::NearestGap | Fact::NearestSpeed => parts.users = true,
                 Fact::RuleBreakers => parts.rule_breakers = true,
@@ -111,8 +117,12 @@ impl Around<'_> {
             ..MomentFacts::default()
         };
         if parts.route {
-            let OnRoute { limit_mps, junction_ahead_m, route_left_m, signal, road, turn } = self.on_route();
+            let OnRoute { limit_mps, junction_ahead_m, junction_end_m, route_left_m, signal, road, turn } =
+                self.on_route();
             (facts.ego_limit_mps, facts.ego_junction_ahead_m) = (limit_mps, junction_ahead_m);
+            facts.ego_junction_end_m = junction_end_m;
+            facts.ego_lane_width_m = 2.0 * self.scene.half_width_m(self.ego_station_m);
+            facts.ego_light_times = self.light_times(signal);
             facts.ego_turn = turn;
             (facts.ego_route_left_m, facts.ego_light, facts.ego_road) =
                 (route_left_m, self.light(signal), road);
@@ -167,6 +177,13 @@ impl Around<'_> {
     /// What the ego vehicle's place says.
     fn on_route(&self) -> OnRoute {
         OnRoute::at(&self.scene.map, &self.scene.route, self.ego_station_m)
+    }
+
+    fn light_times(&self, signal: Option<usize>) -> LightTimes {
+        signal.map_or_else(LightTimes::default, |signal| {
+            let (since, left) = self.signals.around(&self.scene.map, signal, self.tick);
+            LightTimes { since_s: since as f64 * DT_S, left_s: left as f64 * DT_S }
+        })
     }
 
     /// What a traffic light shows; `None` without one.
@@ -228,7 +245,9 @@ pub(super) fn driver_facts(around: &Around, obstacle: &Obstacle, driver: &Driver
     let junction = junction_ahead(&scene.map, ahead, station_m);
     let reach = station_m..=station_m + LIGHT_AHEAD_M;
     let line = way.stop_lines.iter().find(|line| reach.contains(&line.station_m));
-    let light = around.light(line.map(|line| line.signal));
+    let signal = line.map(|line| line.signal);
+    let light = around.light(signal);
+    let end_m = way.end_m.map_or(f64::INFINITY, |end_m| end_m - station_m - obstacle.outline.half_length_m);
     let facts = facts(around, obstacle, way.limit_mps(scene, station_m), junction, light);
     let junction = scene.map.lane(way.lane_at(station_m).0).junction;
     let in_next_junction = junction.is_some() && junction == around.next_junction();
@@ -240,6 +259,8 @@ pub(super) fn driver_facts(around: &Around, obstacle: &Obstacle, driver: &Driver
         in_next_junction,
         crossing_ahead_m: crossing_ahead_m.min(JUNCTION_AHEAD_M_MAX),
         ego_crossing_ahead_m,
+        lane_left_m: end_m.min(JUNCTION_AHEAD_M_MAX),
+        light_times: around.light_times(signal),
         ..facts
     }
 }
@@ -297,10 +318,12 @@ fn facts(
         acceleration_mps2: obstacle.acceleration_mps2,
         crossing_ahead_m: JUNCTION_AHEAD_M_MAX,
         ego_crossing_ahead_m: JUNCTION_AHEAD_M_MAX,
+        lane_left_m: JUNCTION_AHEAD_M_MAX,
         gap_m: obstacle.distance_m,
         junction_ahead_m,
         limit_mps,
         light,
+        light_times: LightTimes::default(),
         priority: Priority::None,
         next_crosswalk_gap_m: around.next_crosswalk_gap_m(obstacle.outline.pose.position),
         contact_in_s: contact_in_s(lengthwise, sideways),

@@ -395,9 +395,10 @@ impl Motion {
     }
 
     /// From now on it does what it is told, as soon as it can.
-    pub fn order(&mut self, command: &Command, tick: u64) {
+    /// `to` is the id of the road user to which the command says to keep a gap, if it names one.
+    pub fn order(&mut self, command: &Command, to: Option<u32>, tick: u64) {
         match self {
-            Motion::Drive(driver) => driver.order(command),
+            Motion::Drive(driver) => driver.order(command, to),
             Motion::Walk(walker) => {
                 command.speed_mps.iter().for_each(|speed_mps| walker.order(*speed_mps, tick));
             }

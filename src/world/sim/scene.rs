@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use avastra_base::geometry::{Path, Vec2};
-use avastra_lang::model::{CROSSWALK_GAP_M_MAX, Road, Trajectory};
+use avastra_lang::model::{CROSSWALK_GAP_M_MAX, Laid, Road};
 use avastra_road::{FootWay, LaneIndex, Neighbour, RoadMap, Route};
 
 use super::junction::ConflictAreas;
@@ -76,8 +76,8 @@ pub struct Scene {
     pub is_motorway: bool,
     /// How far vehicles are sensed, m.
     pub range_m: f64,
-    /// The courses of the space's trajectories; `None` for those on other maps.
-    pub(super) trajectories: Vec<Option<Arc<Trajectory>>>,
+    /// Where the space's trajectories lie; `None` for those on other maps.
+    pub(super) trajectories: Vec<Option<Laid>>,
     pub(super) areas: ConflictAreas,
     /// Where the ways of others cross or join the route, by rising station.
     pub(super) route_areas: Vec<RouteArea>,

@@ -39,6 +39,15 @@ pub(super) struct SignalClock {
     offset_ticks: u64,
 }
 
+/// The cycle of a signal: first it is green, then yellow, then red.
+struct Cycle {
+    /// How far it is, in ticks.
+    at: u64,
+    /// How long it is green, in ticks.
+    green: u64,
+    all: u64,
+}
+
 impl SignalClock {
     /// A clock that is `phase_s` into the cycle; a phase that is negative or not finite counts as 0.
     pub fn new(phase_s: f64) -> SignalClock {
@@ -47,21 +56,35 @@ impl SignalClock {
 
     /// Colour of a signal (an index in `RoadMap::signals`) at a tick.
     pub fn colour(&self, map: &RoadMap, signal: usize, tick: u64) -> SignalColour {
+        let Cycle { at, green, .. } = self.cycle(map, signal, tick);
+        match at {
+            at if at < green => SignalColour::Green,
+            at if at < green + YELLOW_TICKS => SignalColour::Yellow,
+            _ => SignalColour::Red,
+        }
+    }
+
+    /// For how many ticks a signal has had its colour at a tick, and after how many it has another one.
+    pub fn around(&self, map: &RoadMap, signal: usize, tick: u64) -> (u64, u64) {
+        let Cycle { at, green, all } = self.cycle(map, signal, tick);
+        let yellow_ends = green + YELLOW_TICKS;
+        match at {
+            at if at < green => (at, green - at),
+            at if at < yellow_ends => (at - green, yellow_ends - at),
+            _ => (at - yellow_ends, all - at),
+        }
+    }
+
+    fn cycle(&self, map: &RoadMap, signal: usize, tick: u64) -> Cycle {
         let signal = &map.signals[signal];
         // A light on its own (at a zebra crossing) alternates with an unseen group.
         let groups = signal.junction.map_or(2, |junction| map.junctions[junction].groups);
         let groups = (groups.max(signal.group + 1)) as u64;
-        let green_ticks = green_ticks(groups);
-        let slot_ticks = green_ticks + CHANGE_TICKS;
-        let now = (tick + self.offset_ticks) % (groups * slot_ticks);
-        if now / slot_ticks != signal.group as u64 {
-            return SignalColour::Red;
-        }
-        match now % slot_ticks {
-            t if t < green_ticks => SignalColour::Green,
-            t if t < green_ticks + YELLOW_TICKS => SignalColour::Yellow,
-            _ => SignalColour::Red,
-        }
+        let green = green_ticks(groups);
+        let slot = green + CHANGE_TICKS;
+        let all = groups * slot;
+        let now = (tick + self.offset_ticks) % all;
+        Cycle { at: (now + all - signal.group as u64 * slot) % all, green, all }
     }
 
     pub fn trace(&self, trace: &mut Trace) {

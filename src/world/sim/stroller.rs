@@ -5,7 +5,7 @@
 //! as far as the route does, and leave the world when the ego vehicle does not see them.
 
 use avastra_base::geometry::{Pose, Vec2, unit_vector};
-use avastra_lang::model::command::Command;
+use avastra_lang::model::command::{AsideBy, Command};
 
 use super::around::Around;
 use super::pedestrian::is_blocked;
@@ -66,7 +66,12 @@ impl Stroller {
     pub fn order(&mut self, command: &Command) {
         self.speed_mps = command.speed_mps.unwrap_or(self.speed_mps);
         if let Some(left_m) = command.offset_m {
-            (self.wants_left_m, self.aside_mps) = (left_m, command.aside_mps.unwrap_or(ASIDE_MPS));
+            self.aside_mps = match command.aside() {
+                None => ASIDE_MPS,
+                Some(AsideBy::Speed(mps)) => mps,
+                Some(AsideBy::Time(takes_s)) => (left_m - self.left_m).abs() / takes_s,
+            };
+            self.wants_left_m = left_m;
         }
         self.looks_now = true;
     }

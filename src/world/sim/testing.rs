@@ -91,7 +91,9 @@ pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
         turn: None,
         meet: None,
         waits_s: None,
+        early_s: None,
         trajectory: None,
+        behind_first_m: 0.0,
         bearer: None,
     }
 }

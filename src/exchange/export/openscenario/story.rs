@@ -6,12 +6,12 @@
 use core::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
-use avastra_base::geometry::{Path, PathPoint, Pose, SMOOTH_STEP_SLOPE_MAX, wrap_angle};
+use avastra_base::geometry::{Path, PathPoint, Pose, wrap_angle};
 use avastra_campaign::episode::Actor;
-use avastra_lang::model::command::Command;
+use avastra_lang::model::command::{AsideBy, Command};
 use avastra_lang::model::expr::Expr;
 use avastra_lang::model::vocabulary::Verb;
-use avastra_lang::model::{NpcFacts, Road, Trajectory};
+use avastra_lang::model::{Laid, NpcFacts, Road, Trajectory};
 use avastra_road::{Lane, LaneIndex, LanePlace, RoadMap};
 use avastra_world::action::{Course, LaterMoment, SpawnRequest};
 use avastra_world::sim::ASIDE_MPS;
@@ -95,8 +95,12 @@ impl<'a> Cast<'a> {
             Verb::Stand => Ok(Way::Stands),
             Verb::DriveAhead | Verb::DriveBehind | Verb::DriveOpposite if stands => Ok(Way::Stands),
             Verb::Follow => {
-                let known = request.trajectory.and_then(|at| self.road.trajectories[at].as_deref());
-                let Some(trajectory) = known else { return does("follows a way of another map") };
+                let known = request.trajectory.and_then(|on| self.road.trajectories[on.index].as_ref());
+                let trajectory = match known {
+                    Some(Laid::OnMap(trajectory)) => trajectory.as_ref(),
+                    Some(Laid::BesideRoute(_)) => return does("follows a way beside the ego vehicle's route"),
+                    None => return does("follows a way of another map"),
+                };
                 if !trajectory.turns.is_empty() {
                     return does("is turned away from where it goes");
                 }
@@ -296,7 +300,7 @@ impl<'a> Cast<'a> {
             let by_m = (to_m - *offset_m).abs();
             *offset_m = to_m;
             let lane = self.road.map.lane(begin.lane);
-            actions.push(moves_aside(lane, to_m, by_m, command.aside_mps.unwrap_or(ASIDE_MPS)));
+            actions.push(moves_aside(lane, to_m, by_m, command.aside().unwrap_or(AsideBy::Speed(ASIDE_MPS))));
         }
         match actions.is_empty() {
             true => Err("a phase tells nothing that other newcomers know".to_owned()),
@@ -379,8 +383,8 @@ fn changes_speed(mps: f64, rate_mps2: Option<f64>) -> Element {
 }
 
 /// A sinusoidal move that takes as long as one by the smooth step of that greatest speed.
-fn moves_aside(lane: &Lane, to_m: f64, by_m: f64, aside_mps: f64) -> Element {
-    let time_s = SMOOTH_STEP_SLOPE_MAX * by_m / aside_mps;
+fn moves_aside(lane: &Lane, to_m: f64, by_m: f64, aside: AsideBy) -> Element {
+    let time_s = aside.takes_s(by_m);
     // By a cosine: `a = d π² / (2 T²)`.
     let most_mps2 = if time_s > 0.0 { by_m * PI * PI / (2.0 * time_s * time_s) } else { 1.0 };
     let to_m = if lane.is_along() { to_m } else { -to_m };

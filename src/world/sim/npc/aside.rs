@@ -3,7 +3,7 @@
 //! at once and asks nobody.
 
 use avastra_base::geometry::{Pose, SmoothStep, Vec2, smooth_step, unit_vector};
-use avastra_lang::model::command::{Command, IgnoredRules};
+use avastra_lang::model::command::{AsideBy, Command, IgnoredRules};
 use avastra_lang::model::vocabulary::{LaneChoice, Side};
 use avastra_road::LaneIndex;
 
@@ -30,7 +30,7 @@ pub(super) struct Aside {
     wanted_m: f64,
     now_m: f64,
     /// Greatest speed on the way there, m/s; without it as in lane changes of its own.
-    told_mps: Option<f64>,
+    told: Option<AsideBy>,
     shift: Option<Shift>,
 }
 
@@ -57,7 +57,12 @@ impl Aside {
 
     pub fn trace(&self, trace: &mut Trace) {
         trace.word(self.lane.map_or(0, |lane| lane as u64 + 1));
-        trace.numbers([self.wanted_m, self.now_m, self.told_mps.unwrap_or(0.0)]);
+        let told = match self.told {
+            None => 0.0,
+            Some(AsideBy::Speed(mps)) => mps,
+            Some(AsideBy::Time(takes_s)) => -takes_s,
+        };
+        trace.numbers([self.wanted_m, self.now_m, told]);
         if self.was_told_midway {
             trace.word(1);
         }
@@ -95,8 +100,8 @@ impl Driver {
 
     /// From now on it does what it is told, as soon as it can. A command that says where to the side replaces all of the last
     /// one that has not begun; what is under way is finished first.
-    pub fn order(&mut self, command: &Command) {
-        if let Some(pursuit) = Pursuit::told(command) {
+    pub fn order(&mut self, command: &Command, to: Option<u32>) {
+        if let Some(pursuit) = Pursuit::told(command, to) {
             (self.pursuit, self.ordered_mps2) = (Some(Box::new(pursuit)), command.rate_mps2);
         } else if let Some(speed_mps) = command.speed_mps {
             (self.cruise_mps, self.ordered_mps2) = (speed_mps, command.rate_mps2);
@@ -112,7 +117,7 @@ impl Driver {
             let begun_m = self.change.as_ref().map_or(aside.now_m, |change| change.ends_m);
             let heads_for_m = aside.shift.map_or(begun_m, |shift| shift.to_m);
             aside.wanted_m = command.offset_m.unwrap_or(heads_for_m);
-            (aside.lane, aside.told_mps) = (command.lane, command.aside_mps);
+            (aside.lane, aside.told) = (command.lane, command.aside());
             aside.was_told_midway = command.lane.is_some() && self.change.is_some();
         }
     }
@@ -142,21 +147,21 @@ impl Driver {
     pub(super) fn begin_aside(&mut self, view: &View) {
         let Some(aside) = self.aside.as_deref_mut() else { return };
         let was_told_midway = core::mem::take(&mut aside.was_told_midway);
-        let Aside { lane, wanted_m, now_m, told_mps, shift, .. } = aside.clone();
+        let Aside { lane, wanted_m, now_m, told, shift, .. } = aside.clone();
         if was_told_midway && lane.is_some_and(|lane| self.is_leaving(lane, view)) {
-            self.break_off(told_mps, view.around);
+            self.break_off(told, view.around);
         }
         if self.change.is_some() || shift.is_some() {
             return;
         }
         if let Some(lane) = lane
-            && !self.go_over(lane, told_mps, view)
+            && !self.go_over(lane, told, view)
         {
             return;
         }
         if wanted_m != now_m {
             let duration_s =
-                duration_s((wanted_m - now_m).abs(), self.speed_mps, Whose::Told(told_mps), view.around);
+                duration_s((wanted_m - now_m).abs(), self.speed_mps, Whose::Told(told), view.around);
             let shift = Shift { from_m: now_m, to_m: wanted_m, progress: 0.0, duration_s };
             self.aside.get_or_insert_default().shift = Some(shift);
         }
@@ -170,7 +175,7 @@ impl Driver {
 
     /// Begins a change to the next lane on the way to the one that is meant, if the road and others leave the place; whether
     /// it is in that lane already.
-    fn go_over(&mut self, lane: LaneChoice, told_mps: Option<f64>, view: &View) -> bool {
+    fn go_over(&mut self, lane: LaneChoice, told: Option<AsideBy>, view: &View) -> bool {
         let View { this, around, .. } = *view;
         // An error: in a junction, or where that lane has not begun yet.
         let Ok(side) = self.side_of(lane, this, self.ignores, around) else { return false };
@@ -178,7 +183,7 @@ impl Driver {
             self.aside.get_or_insert_default().lane = None;
             return true;
         };
-        let whose = Whose::Told(told_mps);
+        let whose = Whose::Told(told);
         if !self.may_change(view) {
             return false;
         }

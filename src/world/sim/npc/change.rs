@@ -11,6 +11,7 @@ use avastra_base::geometry::{
     unit_vector, wrap_angle,
 };
 use avastra_base::kinematics::{GRAVITY_MPS2, braking_m};
+use avastra_lang::model::command::AsideBy;
 use avastra_lang::model::vocabulary::Side;
 use avastra_road as road;
 use avastra_road::{Lane, LaneIndex, is_apart};
@@ -91,8 +92,8 @@ pub(super) struct BrokenOff {
 pub(super) enum Whose {
     /// The driver's own: it leaves others room.
     Own,
-    /// It was told to, perhaps at a greatest speed to the side, m/s. Then it begins as soon as nobody is beside it.
-    Told(Option<f64>),
+    /// It was told to, and perhaps how. Then it begins as soon as nobody is beside it.
+    Told(Option<AsideBy>),
 }
 
 impl Change {
@@ -206,12 +207,12 @@ impl Driver {
     }
 
     /// Turns back from a lane change under way to the lane that it leaves. One that leads back is not broken off again.
-    pub(super) fn break_off(&mut self, told_mps: Option<f64>, around: &Around) {
+    pub(super) fn break_off(&mut self, told: Option<AsideBy>, around: &Around) {
         let Some(change) = self.change.take_if(|change| change.broken_off.is_none()) else { return };
         let Change { to, to_station_m, progress, duration_s: took_s, ends_m, .. } = change;
         let (left, left_m, aside_m) = (Arc::clone(&self.way), self.station_m, self.aside_m());
         let over = to.path.position_at(to_station_m) - left.path.position_at(left_m);
-        let back_s = duration_s(over.norm(), self.speed_mps, Whose::Told(told_mps), around);
+        let back_s = duration_s(over.norm(), self.speed_mps, Whose::Told(told), around);
         // Quicker than what is left of the first change it would lead beyond the middle of the lane.
         let duration_s = back_s.max(took_s * (1.0 - progress));
         self.comes_into(to, to_station_m, ends_m);
@@ -435,10 +436,9 @@ fn change_gap_m(closing_mps: f64, traffic: &TrafficProfile) -> f64 {
 pub(super) fn duration_s(aside_m: f64, speed_mps: f64, whose: Whose, around: &Around) -> f64 {
     match whose {
         Whose::Own | Whose::Told(None) => change_duration_s(aside_m, around.traffic),
-        Whose::Told(Some(told_mps)) => {
+        Whose::Told(Some(told)) => {
             let grip_mps2 = around.grip.friction(speed_mps) * GRAVITY_MPS2;
-            (SMOOTH_STEP_SLOPE_MAX * aside_m / told_mps)
-                .max((SMOOTH_STEP_BEND_MAX * aside_m / grip_mps2).sqrt())
+            told.takes_s(aside_m).max((SMOOTH_STEP_BEND_MAX * aside_m / grip_mps2).sqrt())
         }
     }
 }

@@ -299,10 +299,7 @@ impl Driver {
         if let Some(leader) = &self.leader {
             wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, leader, free_mps2));
         }
-        if self.keeps_gap()
-            && !self.ignores.contains(TrafficRule::Ego)
-            && let Some(braking_mps2) = self.braking_for_ego_mps2(size, around)
-        {
+        if let Some(braking_mps2) = self.braking_for_kept_mps2(size, around) {
             wanted_mps2 = wanted_mps2.min(-braking_mps2);
         }
         if line_ahead_m < f64::INFINITY {

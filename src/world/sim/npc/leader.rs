@@ -59,10 +59,13 @@ impl Driver {
             + self.speed_mps * (self.time_gap_s + self.speed_mps / (2.0 * COMFORT_MPS2))
             + size.length_m / 2.0;
         let mut nearest: Option<Leader> = None;
-        // The gap that it keeps to the ego vehicle, the first of all that it minds, is not that of following.
-        let skips = usize::from(self.keeps_gap() && !self.ignores.contains(TrafficRule::Ego));
-        for other in self.minded(around).skip(skips) {
+        // The gap that it keeps to somebody is not that of following.
+        let kept = self.kept(around).map(|(kept, _)| kept.outline);
+        for other in self.minded(around) {
             let outline = other.outline;
+            if kept.is_some_and(|kept| core::ptr::eq(kept, outline)) {
+                continue;
+            }
             let delta = outline.pose.position - here.position;
             let reach_m = reach_m + outline.half_length_m;
             if delta.norm_squared() > reach_m * reach_m || forward.dot(&delta) < 0.0 {

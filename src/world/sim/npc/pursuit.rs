@@ -1,5 +1,5 @@
-//! What drivers are told to do beside the ego vehicle: to keep a gap to it, ahead of it or behind it, or to be at a place so
-//! much before it. Both say the speed, from tick to tick, as OpenSCENARIO's continuous `LongitudinalDistanceAction` and its
+//! What drivers are told to do beside another one: to keep a gap to the ego vehicle or to a road user, ahead of it or behind it,
+//! or to be at a place so much before the ego vehicle. Both say the speed, from tick to tick, as OpenSCENARIO's continuous `LongitudinalDistanceAction` and its
 //! `SynchronizeAction` do. Lights, bends and others may still make a vehicle slower.
 
 use avastra_base::kinematics::{braking_m, needed_mps2};
@@ -7,9 +7,10 @@ use avastra_lang::model::command::Command;
 
 use avastra_road::LaneIndex;
 
-use crate::sim::around::Around;
+use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
+use crate::sim::road_user::Obstacle;
 use crate::sim::trace::Trace;
 use crate::sim::world::DT_S;
 
@@ -39,7 +40,8 @@ pub(super) struct Pursuit {
 
 #[derive(Debug, Clone, Copy)]
 enum Aim {
-    Gap(Gap),
+    /// To the road user of that id, or to the ego vehicle.
+    Gap(Gap, Option<u32>),
     /// Its front is there so much before that of the ego vehicle, s: at this station of the ego vehicle's route, or where its way
     /// crosses that.
     Place {
@@ -56,25 +58,27 @@ enum Gap {
     Time(f64),
 }
 
-/// Where the ego vehicle is beside the driver, along the ego vehicle's route.
+/// Where another one is beside the driver, along the ego vehicle's route.
 struct Beside {
     /// From bumper to bumper, m; negative if they are side by side.
     gap_m: f64,
     is_ahead: bool,
+    /// How fast the other one is along the route, m/s.
+    other_mps: f64,
 }
 
 impl Pursuit {
-    pub fn told(command: &Command) -> Option<Pursuit> {
+    pub fn told(command: &Command, to: Option<u32>) -> Option<Pursuit> {
         let Command { speed_mps: speed_mps_max, keep_m, keep_s, early_s, at_m, .. } = *command;
-        let gap = keep_m.map(Gap::Way).or(keep_s.map(Gap::Time)).map(Aim::Gap);
+        let gap = keep_m.map(Gap::Way).or(keep_s.map(Gap::Time)).map(|gap| Aim::Gap(gap, to));
         let place = early_s.map(|early_s| Aim::Place { early_s, station_m: at_m });
         Some(Pursuit { aim: gap.or(place)?, speed_mps_max, crosses_in: None, is_met: false })
     }
 
     pub fn trace(&self, trace: &mut Trace) {
         let (kind, numbers) = match self.aim {
-            Aim::Gap(Gap::Way(gap_m)) => (1, [gap_m, 0.0]),
-            Aim::Gap(Gap::Time(gap_s)) => (2, [gap_s, 0.0]),
+            Aim::Gap(Gap::Way(gap_m), to) => (1, [gap_m, to.map_or(0.0, f64::from)]),
+            Aim::Gap(Gap::Time(gap_s), to) => (2, [gap_s, to.map_or(0.0, f64::from)]),
             Aim::Place { early_s, station_m } => (3, [early_s, station_m.unwrap_or(f64::INFINITY)]),
         };
         trace.words([kind, u64::from(self.is_met), self.crosses_in.map_or(0, |lane| lane.0 as u64 + 1)]);
@@ -94,9 +98,16 @@ impl Driver {
         ways_to(view, station_m).0 <= 0.0
     }
 
-    /// Whether it keeps a gap to the ego vehicle and does not follow it by itself.
-    pub(super) fn keeps_gap(&self) -> bool {
-        matches!(self.pursuit.as_deref(), Some(Pursuit { aim: Aim::Gap(_), .. }))
+    /// The one to whom it keeps a gap, and its acceleration, m/s²: it does not follow that one by itself.
+    pub(super) fn kept<'a>(&self, around: &'a Around) -> Option<(Other<'a>, f64)> {
+        let Some(Pursuit { aim: Aim::Gap(_, to), .. }) = self.pursuit.as_deref() else { return None };
+        match to {
+            None => Some((around.ego(), around.ego.acceleration_mps2)),
+            Some(id) => {
+                let other = around.obstacles().find(|other| other.id == *id)?;
+                Some((other.into(), other.acceleration_mps2))
+            }
+        }
     }
 
     /// The acceleration that brings it where it was told to be beside the ego vehicle, m/s²; `None` if it was told nothing.
@@ -107,9 +118,14 @@ impl Driver {
             pursuit.speed_mps_max.unwrap_or_else(|| self.way.limit_mps(around.scene, self.station_m));
         let mps2_max = (speed_mps_max.min(bend_mps) - self.speed_mps) / DT_S;
         let wanted_mps2 = match pursuit.aim {
-            Aim::Gap(gap) => {
-                let Beside { gap_m, is_ahead } = beside(view);
-                let behind_mps = if is_ahead { around.ego.speed_mps } else { self.speed_mps };
+            Aim::Gap(gap, to) => {
+                let Some(Beside { gap_m, is_ahead, other_mps }) = beside(view, to) else {
+                    // That one has left the world: it keeps the speed that it has.
+                    self.cruise_mps = self.speed_mps;
+                    self.pursuit = None;
+                    return None;
+                };
+                let behind_mps = if is_ahead { other_mps } else { self.speed_mps };
                 let wanted_m = match gap {
                     Gap::Way(way_m) => way_m,
                     Gap::Time(gap_s) => behind_mps * gap_s,
@@ -122,7 +138,7 @@ impl Driver {
                     Gap::Way(_) | Gap::Time(_) => 0.0,
                 };
                 let closing_per_s = (CLOSING_PER_S - damps_per_s).max(0.0);
-                GAP_PER_S2 * lacks_m + closing_per_s * (around.ego.speed_mps - self.speed_mps)
+                GAP_PER_S2 * lacks_m + closing_per_s * (other_mps - self.speed_mps)
             }
             Aim::Place { early_s, station_m } => {
                 let ways = match station_m {
@@ -155,15 +171,18 @@ impl Driver {
         Some(wanted_mps2.min(mps2_max))
     }
 
-    /// How hard it must brake not to run into an ego vehicle to which it keeps a gap, m/s², if that one goes on braking as it
-    /// does; `None` if gentle braking will do.
-    pub(super) fn braking_for_ego_mps2(&self, size: &BodyParameters, around: &Around) -> Option<f64> {
-        let (gap_m, ego_mps) = self.gap_to(size, around.ego())?;
+    /// How hard it must brake not to run into the one to whom it keeps a gap, m/s², if that one goes on braking as it does; `None`
+    /// if gentle braking will do, and of one that it ignores.
+    pub(super) fn braking_for_kept_mps2(&self, size: &BodyParameters, around: &Around) -> Option<f64> {
+        let (kept, kept_mps2) = self.kept(around)?;
+        let is_minded = |other: Other| core::ptr::eq(other.outline, kept.outline);
+        self.minded(around).any(is_minded).then_some(())?;
+        let (gap_m, other_mps) = self.gap_to(size, kept)?;
         let room_m = (gap_m - ROOM_M).max(0.1);
-        let closing_mps = (self.speed_mps - ego_mps).max(0.0);
-        let ego_braking_mps2 = -around.ego.acceleration_mps2;
-        let until_it_stands_mps2 = match ego_braking_mps2 > COMFORT_MPS2 {
-            true => needed_mps2(self.speed_mps, room_m + braking_m(ego_mps.max(0.0), ego_braking_mps2)),
+        let closing_mps = (self.speed_mps - other_mps).max(0.0);
+        let braking_mps2 = -kept_mps2;
+        let until_it_stands_mps2 = match braking_mps2 > COMFORT_MPS2 {
+            true => needed_mps2(self.speed_mps, room_m + braking_m(other_mps.max(0.0), braking_mps2)),
             false => 0.0,
         };
         let needed_mps2 = needed_mps2(closing_mps, room_m).max(until_it_stands_mps2);
@@ -205,15 +224,30 @@ fn ways_to(view: &View, station_m: f64) -> (f64, f64) {
     (own_m - half_length_m, station_m - VehicleParameters::MKZ.front_m(around.ego_station_m))
 }
 
-fn beside(view: &View) -> Beside {
+/// Where the road user of that id, or the ego vehicle, is; `None` if that one is not there any more.
+fn beside(view: &View, to: Option<u32>) -> Option<Beside> {
     let View { this, around, .. } = *view;
-    let (here_m, _, along) = around.beside_route(this.outline.pose.position);
-    let (half_length_m, _) = this.outline.half_extent_m(this.forward, along);
-    let ego = VehicleParameters::MKZ;
-    let (front_m, rear_m) = (ego.front_m(around.ego_station_m), ego.rear_m(around.ego_station_m));
-    // The ego vehicle has moved in this tick already.
-    let here_m = here_m + along.dot(&this.velocity_mps) * DT_S;
+    // The middle, half the length, and the speed.
+    let along_route = |one: &Obstacle| {
+        let (middle_m, _, along) = around.beside_route(one.outline.pose.position);
+        (middle_m, one.outline.half_extent_m(one.forward, along).0, along.dot(&one.velocity_mps))
+    };
+    let (mut here_m, half_length_m, own_mps) = along_route(this);
+    let (front_m, rear_m, other_mps) = match to {
+        None => {
+            let ego = VehicleParameters::MKZ;
+            // The ego vehicle has moved in this tick already.
+            here_m += own_mps * DT_S;
+            let at_m = around.ego_station_m;
+            (ego.front_m(at_m), ego.rear_m(at_m), around.ego.speed_mps)
+        }
+        Some(id) => {
+            let other = around.obstacles().find(|other| other.id == id)?;
+            let (middle_m, half_m, other_mps) = along_route(other);
+            (middle_m + half_m, middle_m - half_m, other_mps)
+        }
+    };
     let is_ahead = here_m > (front_m + rear_m) / 2.0;
     let gap_m = if is_ahead { here_m - half_length_m - front_m } else { rear_m - here_m - half_length_m };
-    Beside { gap_m, is_ahead }
+    Some(Beside { gap_m, is_ahead, other_mps })
 }

@@ -16,6 +16,8 @@ use super::{Asked, commanded};
 
 /// How far beyond the asked distance a crossing may lie, m.
 const CROSSING_M: f64 = 60.0;
+/// Nobody who is to be somewhere before the ego vehicle comes from farther away than this time, s.
+const ARRIVAL_S_MAX: f64 = 120.0;
 /// A stop line within this distance behind a newcomer counts as passed when it appears, m.
 const BEYOND_LINE_M: f64 = 30.0;
 /// How long a vehicle stands at a stop sign, s, and its braking before it, m/s². Ours, and that of the drivers' model.
@@ -35,7 +37,18 @@ pub(super) fn cross_road(asked: &Asked) -> Result<Driver, String> {
         {
             continue;
         }
-        match rendezvous(asked, conflict, arrivals.after_s(around, distance_m)) {
+        let arrival_s = match request.early_s {
+            None => arrivals.after_s(around, distance_m),
+            // Infinite while the ego vehicle stands.
+            Some(early_s) => match distance_m / around.ego.speed_mps - early_s {
+                arrival_s if (0.0..=ARRIVAL_S_MAX).contains(&arrival_s) => arrival_s,
+                _ => {
+                    reason = Some("the ego vehicle, at its present speed, is not there at that time".to_owned());
+                    continue;
+                }
+            },
+        };
+        match rendezvous(asked, conflict, arrival_s) {
             Ok(driver) => return Ok(driver),
             Err(why) => reason = Some(why),
         }
@@ -54,7 +67,7 @@ pub(super) fn cross_road(asked: &Asked) -> Result<Driver, String> {
 fn rendezvous(asked: &Asked, conflict: &Conflict, arrival_s: f64) -> Result<Driver, String> {
     let Asked { around, request, size, id, .. } = *asked;
     let map = &around.scene.map;
-    let needed_m = request.speed_mps * arrival_s + size.length_m;
+    let needed_m = request.speed_mps * arrival_s + request.behind_first_m + size.length_m;
     let mut lanes = vec![conflict.lane];
     let mut upstream_m = conflict.lane_station_m;
     let on_route = |lane: LaneIndex| around.scene.route.lanes.iter().any(|part| part.lane == lane);
@@ -69,7 +82,10 @@ fn rendezvous(asked: &Asked, conflict: &Conflict, arrival_s: f64) -> Result<Driv
     let meeting_m = way.lane_begin_m(conflict.lane).expect("the way was made through this lane")
         + conflict.lane_station_m;
     let front_m = approach_m(asked, &way, meeting_m, arrival_s)?;
-    let station_m = front_m - size.length_m / 2.0;
+    let station_m = front_m - request.behind_first_m - size.length_m / 2.0;
+    if station_m < size.length_m / 2.0 {
+        return Err("the crossing road is too short".into());
+    }
     if request.then == Then::Keep {
         return Ok(commanded(asked, way, Some(conflict.lane), station_m, Vec::new()));
     }

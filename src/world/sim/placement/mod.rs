@@ -14,8 +14,9 @@ use std::sync::Arc;
 
 use crate::action::{SpawnFacts, SpawnRequest};
 use avastra_base::kinematics::braking_m;
+use avastra_lang::model::Laid;
 use avastra_lang::model::vocabulary::Verb;
-use avastra_road::LaneIndex;
+use avastra_road::{LaneIndex, Route};
 
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
@@ -90,11 +91,26 @@ pub(super) fn place(
     Ok(Newcomers { asked: finish(&asked, Motion::Drive(driver), moved)?, cover: None })
 }
 
-/// Who follows a trajectory, at its station.
+/// Who follows a trajectory, at its station, or where that begins beside the route.
 fn on_trajectory(asked: &Asked) -> Result<Newcomers, String> {
     let Asked { around, request, size, .. } = asked;
-    let way = request.trajectory.and_then(|index| around.scene.trajectories.get(index)?.clone());
-    let way = way.ok_or("its trajectory lies on another map")?;
+    let scene = around.scene;
+    let on = request.trajectory.ok_or("it follows no trajectory")?;
+    let laid = scene.trajectories.get(on.index).and_then(Option::as_ref);
+    let way = match laid.ok_or("its trajectory lies on another map")? {
+        Laid::OnMap(way) => Arc::clone(way),
+        Laid::BesideRoute(way) => {
+            let begins_m = on.begins_m.filter(|begins_m| begins_m.is_finite());
+            let begins_m = begins_m.ok_or("nobody of that name is there")?;
+            let begins_m = VehicleParameters::MKZ.front_m(around.ego_station_m) + begins_m;
+            let Route { path, .. } = &scene.route;
+            if begins_m > path.length_m() {
+                return Err("the route ends before that distance".into());
+            }
+            let height_m = |station_m| scene.route.height_at(&scene.map, station_m);
+            Arc::new(way.laid(path, begins_m, height_m).ok_or("the route leaves nothing of its trajectory")?)
+        }
+    };
     if request.distance_m > way.path.length_m() {
         return Err("the trajectory ends before that station".into());
     }

@@ -109,6 +109,11 @@ impl World {
         if let Some(reason) = order.impossible(obstacle.verb) {
             return Err(reason);
         }
+        match order.command.to.map(|who| self.bearer_id(who)) {
+            Some(None) => return Err("nobody is there to whom it is to keep a gap".to_owned()),
+            Some(Some(id)) if id == obstacle.id => return Err("it keeps no gap to itself".to_owned()),
+            Some(Some(_)) | None => {}
+        }
         if let Motion::Drive(driver) = &mover.motion {
             let (around, command) = (self.alone(), &order.command);
             let ignores = command.ignores.unwrap_or(driver.ignores);
@@ -134,10 +139,11 @@ impl World {
 
     fn order(&mut self, order: &OrderRequest) -> Result<(), String> {
         let index = self.ordered(order)?;
+        let to = order.command.to.and_then(|who| self.bearer_id(who));
         let mover = &mut self.users[index].mover;
         // The phases that are left of a manoeuvre are dropped.
         mover.course = None;
-        mover.motion.order(&order.command, self.ticks);
+        mover.motion.order(&order.command, to, self.ticks);
         Ok(())
     }
 
@@ -181,8 +187,13 @@ impl World {
                 (command, tracked) => command.or(tracked),
             };
             mover.course = rest;
-            if let Some(command) = command {
-                mover.motion.order(&command, self.ticks);
+            let Some(command) = command else { continue };
+            let to = command.to.map(|who| self.bearer_id(who).filter(|id| *id != self.users[index].obstacle.id));
+            let mover = &mut self.users[index].mover;
+            match to {
+                // Without somebody to whom the gap would be kept that has no value.
+                Some(None) => mover.course = None,
+                to => mover.motion.order(&command, to.flatten(), self.ticks),
             }
         }
     }
