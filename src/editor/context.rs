@@ -4,9 +4,9 @@
 use avastra_lang::check::{Declaration, References, Symbol};
 use avastra_lang::model::Type;
 use avastra_lang::model::vocabulary::{
-    BREACHED, BodyClass, CHANGE, CommandField, EpisodeField, Fact, KEPT, Known, MARGIN, PointField,
-    RECURRENCE, ROAD_USER, RoadField, SINCE, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField,
-    StopReason, THERE, TrajectoryField, WAIT, Word, parts_of, parts_of_named, things,
+    BREACHED, BodyClass, CHANGE, CommandField, EpisodeField, Fact, KEPT, Known, LIGHT, LightField, MARGIN,
+    PointField, RECURRENCE, ROAD_USER, RoadField, SINCE, ScenarioClaim, Site, SpaceClaim, SpawnField,
+    StartField, StopReason, THERE, TrajectoryField, WAIT, Word, parts_of, parts_of_named, things,
 };
 use avastra_lang::syntax::ast::{
     Action, ActionParam, Arm, BinaryOp, Call, Effect, EffectKind, Expr, ExprKind, Field, Initial, ItemKind,
@@ -275,7 +275,16 @@ impl<'a> Place<'a> {
                 let key = key.as_ref().and_then(|key| self.within(key, of_key, None));
                 key.or_else(|| self.within(value, known.and_then(|state| state.ty), None))
             }
-            EffectKind::Order { who, .. } if is_here(who) => Some(self.road_users()),
+            EffectKind::Order { who, .. } if is_here(who) => {
+                Some(self.road_users().into_iter().chain([Kind::Words(vec![LIGHT])]).collect())
+            }
+            EffectKind::Order { who, fields } if who.text == LIGHT.0 => fields.iter().find_map(|field| {
+                if is_here(&field.name) {
+                    return Some(unused::<LightField>(fields));
+                }
+                let words = Kind::Words(words::light_words(&field.name.text));
+                self.word_or_value(words, &field.value, None)
+            }),
             EffectKind::Order { fields, .. } => fields.iter().find_map(|field| match is_here(&field.name) {
                 true => Some(unused::<CommandField>(fields)),
                 false => self.in_command(field),
@@ -324,6 +333,7 @@ impl<'a> Place<'a> {
     fn in_command(&self, field: &Field) -> Option<Vec<Kind>> {
         match CommandField::from_name(&field.name.text) {
             Some(CommandField::Then) => self.word_or_value(Kind::Manoeuvres, &field.value, None),
+            Some(CommandField::To) => self.word_or_value(Kind::RoadUsers, &field.value, None),
             Some(CommandField::Lane | CommandField::Ignores) => {
                 self.word_or_value(Kind::Words(words::engine_words(&field.name.text)), &field.value, None)
             }

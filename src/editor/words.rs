@@ -2,8 +2,9 @@
 //! engine's words in `model::vocabulary`.
 
 use avastra_lang::model::vocabulary::{
-    BEGINS, Body, Colour, CommandField, EpisodeField, LaneChoice, NearWord, PastWord, ROAD_USER, RoadField,
-    SINCE, Side, Site, SpawnField, StartField, TYPES, Then, TrafficRule, Turning, Verb, Word,
+    BEGINS, Body, Colour, CommandField, EpisodeField, LaneChoice, LightColour, LightField, NearWord,
+    PastWord, ROAD_USER, RoadField, SINCE, Side, Site, SpawnField, StartField, TYPES, Then, TrafficRule,
+    Turning, Verb, Word,
 };
 use avastra_lang::model::{ENDS, MODULES};
 
@@ -54,6 +55,14 @@ pub fn engine_words(field: &str) -> Vec<Entry> {
             | SpawnField::Siren,
         )
         | None => Vec::new(),
+    }
+}
+
+/// The words for a field of `order light`.
+pub fn light_words(field: &str) -> Vec<Entry> {
+    match LightField::from_name(field) {
+        Some(LightField::Colour) => of::<LightColour>(),
+        Some(LightField::At) | None => Vec::new(),
     }
 }
 

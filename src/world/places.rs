@@ -199,6 +199,7 @@ fn without_place<'a>(
         let is_about_others = |effect: &EffectDef| match effect {
             EffectDef::Order(_) => true,
             EffectDef::Spawn(spawn) => spawn.of.is_some(),
+            EffectDef::Light(_) => true,
             EffectDef::Set(_) => false,
         };
         let orders = action.effects.iter().any(is_about_others);

@@ -26,7 +26,7 @@ fn names() -> Vec<String> {
 fn spawns(draw: &Draw) -> impl Iterator<Item = &SpawnRequest> {
     draw.effects.iter().filter_map(|effect| match effect {
         Effect::Spawn(request) => Some(request),
-        Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) => None,
+        Effect::Time(_) | Effect::Sky(..) | Effect::Light(_) | Effect::Order(_) => None,
     })
 }
 

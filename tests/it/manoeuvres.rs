@@ -10,7 +10,7 @@ use avastra::episode::{Choice, Moment, Outcome};
 use avastra::geometry::{
     Pose, SMOOTH_STEP_SLOPE_MAX, Vec2, distance_m, smooth_step, unit_vector, wrap_angle,
 };
-use avastra::model::vocabulary::Priority;
+use avastra::model::vocabulary::{Light, Priority};
 use avastra::model::{NpcFacts, RulesInForce};
 use avastra::rng;
 use avastra::rng::{Rng, Stream};
@@ -138,6 +138,173 @@ fn who_stands_before_a_junction_turns_in_time() {
         turns += 1;
     }
     assert!(turns >= 3, "{turns} cars turned");
+}
+
+#[test]
+fn who_follows_a_way_beside_the_route_passes_its_points() {
+    let table = wish("walks_round_a_van");
+    let mut walks = 0;
+    for Seen { moments, .. } in watched(&table, &["walks_round()"], &[], 8, &[]) {
+        let middle = |npc: &NpcFacts| ((npc.front_m + npc.rear_m) / 2.0, npc.offset_m);
+        let (begin_m, _) = middle(&moments[0].1);
+        let (_, last) = moments.last().expect("it is there");
+        if last.offset_m < 4.0 - PLACE_M {
+            continue;
+        }
+        for (along_m, offset_m) in [(10.0, -2.0), (4.0, -1.5), (0.0, 0.0), (0.0, 4.0)] {
+            let away_m = moments.iter().map(|(_, npc)| {
+                let (here_m, left_m) = middle(npc);
+                libm::hypot(here_m - begin_m + 10.0 - along_m, left_m - offset_m)
+            });
+            assert!(away_m.fold(f64::INFINITY, f64::min) < PLACE_M, "{along_m} m, {offset_m} m");
+        }
+        walks += 1;
+    }
+    assert!(walks >= 6, "{walks} walks");
+}
+
+#[test]
+fn one_keeps_its_gap_to_another_that_slows_down() {
+    let table = wish("drives_in_convoy");
+    let run = run_of(table.space().clone(), 8, 4, &[]);
+    let mut kept = 0;
+    for episode in 0..run.episodes() {
+        let gap_m = Cell::new(None);
+        let mut choose = |moment: &Moment| match table.offer(moment.situation, row(&table, "convoy()")) {
+            Ok(draw) if gap_m.get().is_none() => {
+                gap_m.set(Some(number(&draw, "gap")));
+                Choice::Act(draw)
+            }
+            _ => Choice::Pass,
+        };
+        let mut worst_m = 0.0_f64;
+        let log = run.play(episode, &mut choose, &mut |world, _, contacts| {
+            let (Some(car), Some(truck)) = (world.npc_facts(1), world.npc_facts(2)) else { return };
+            let wanted_m = gap_m.get().expect("it was drawn");
+            // The truck brakes and gains speed at 1 m/s², and the car follows it critically damped (1 rad/s / 2): it is never
+            // farther off than a second-order system behind a ramp of its speed, 1 / 0.25 m.
+            if contacts.is_empty() && car.front_m > 0.0 {
+                worst_m = worst_m.max((truck.rear_m - car.front_m - wanted_m).abs());
+            }
+        });
+        assert_replays(&run, episode, &log);
+        assert!(worst_m < 4.0, "{worst_m} m");
+        kept += usize::from(worst_m > 0.1);
+    }
+    assert!(kept >= 3, "in {kept} episodes the truck slowed down");
+}
+
+#[test]
+fn as_many_of_a_row_appear_as_are_asked_for() {
+    let table = wish("queue_of_some");
+    for cars in 1..=4 {
+        let run = run_of(table.space().clone(), 8, 2, &["longer_at_night"]);
+        for episode in 0..run.episodes() {
+            let mut is_done = false;
+            let label = format!("queue(cars: {cars})");
+            let mut choose = |moment: &Moment| match table.offer(moment.situation, row(&table, &label)) {
+                Ok(draw) if !is_done => {
+                    is_done = true;
+                    Choice::Act(draw)
+                }
+                _ => Choice::Pass,
+            };
+            let mut most = 0;
+            let log =
+                run.play(episode, &mut choose, &mut |world, _, _| most = most.max(world.obstacles().count()));
+            assert_replays(&run, episode, &log);
+            assert_eq!(most, if is_done { cars } else { 0 });
+        }
+    }
+}
+
+#[test]
+fn who_is_to_cross_early_is_placed_so_for_the_present_speeds() {
+    let table = wish("meets_within_half_a_second");
+    let mut met = 0;
+    for label in ["runs(from: Left)", "runs(from: Right)"] {
+        for Seen { moments, drawn } in watched(&table, &[label], &["by", "speed"], 12, &[]) {
+            let (first, next) = (&moments[0].1, &moments[1].1);
+            let ego_mps = (first.ego_crossing_ahead_m - next.ego_crossing_ahead_m) / DT_S;
+            let own_mps = (first.crossing_ahead_m - next.crossing_ahead_m) / DT_S;
+            assert!(own_mps <= drawn[1] + 1e-6, "{own_mps} m/s");
+            let Some(passes) = moments.windows(2).position(|pair| {
+                let [(_, before), (_, after)] = pair else { unreachable!("pairs") };
+                before.crossing_ahead_m < 1.0 && after.crossing_ahead_m > before.crossing_ahead_m
+            }) else {
+                continue;
+            };
+            // Of a way that crosses the route twice, nobody says which place is meant.
+            if moments[passes + 1].1.crossing_ahead_m < 1000.0 {
+                continue;
+            }
+            let early_s = first.ego_crossing_ahead_m / ego_mps - (moments[passes].0 - moments[0].0);
+            // A bend on its way makes it a little sooner.
+            let is_straight =
+                moments[..=passes].iter().all(|(_, npc)| (npc.speed_mps - drawn[1]).abs() < 0.01);
+            let most_s = if is_straight { 0.15 } else { 0.4 };
+            assert!((early_s - drawn[0]).abs() < most_s, "{early_s} s, wanted {} s", drawn[0]);
+            met += 1;
+        }
+    }
+    assert!(met >= 6, "{met} meetings");
+}
+
+#[test]
+fn a_light_turns_yellow_when_the_ego_vehicle_is_so_near() {
+    let table = wish("yellow_at_the_wrong_moment");
+    let run = run_of(table.space().clone(), 8, 24, &[]);
+    let mut turned = 0;
+    for episode in 0..run.episodes() {
+        let at_m = Cell::new(None);
+        let mut choose = |moment: &Moment| match table.offer(moment.situation, row(&table, "turns_yellow()"))
+        {
+            Ok(draw) if at_m.get().is_none() => {
+                at_m.set(Some(number(&draw, "at")));
+                Choice::Act(draw)
+            }
+            _ => Choice::Pass,
+        };
+        let (mut before, mut begins) = (None, None);
+        let log = run.play(episode, &mut choose, &mut |world, _, _| {
+            let Some(at_m) = at_m.get() else { return };
+            let facts = world.moment_facts();
+            let line_m =
+                world.scene().route.stop_lines.iter().find(|line| line.station_m >= world.ego_station_m());
+            let away_m = line_m.map_or(f64::INFINITY, |line| line.station_m - facts.ego_front_m);
+            if before == Some(Light::Green) && facts.ego_light == Light::Yellow && begins.is_none() {
+                begins = Some((away_m, at_m, facts.ego_light_times.since_s, facts.ego_speed_mps));
+            }
+            before = Some(facts.ego_light);
+        });
+        assert_replays(&run, episode, &log);
+        let Some((away_m, at_m, since_s, ego_mps)) = begins else { continue };
+        assert!(away_m <= at_m && at_m - away_m <= ego_mps * 2.0 * DT_S, "{away_m} m, wanted {at_m} m");
+        assert!(since_s <= DT_S, "yellow for {since_s} s");
+        turned += 1;
+    }
+    assert!(turned >= 3, "{turned} lights");
+}
+
+#[test]
+fn who_joins_changes_before_its_lane_ends_and_in_the_time_that_it_is_given() {
+    let table = wish("joins_and_changes_in_time");
+    let mut joined = 0;
+    for Seen { moments, drawn } in watched(&table, &["truck_joins()"], &["left", "takes"], 8, &[]) {
+        let [left_m, takes_s] = drawn[..] else { panic!("two values") };
+        // What is left of its lane is what it does not drive.
+        for pair in moments.windows(2).filter(|pair| pair[1].1.lane_left_m < 1000.0) {
+            let [(_, before), (_, after)] = pair else { unreachable!("pairs") };
+            let driven_m = after.front_m - before.front_m;
+            assert!((before.lane_left_m - after.lane_left_m - driven_m).abs() < 0.01, "{before:?} {after:?}");
+        }
+        let Some(begin) = moments.iter().position(|(_, npc)| npc.lane_left_m <= left_m) else { continue };
+        let Some(end) = moments.iter().position(|(_, npc)| npc.offset_m.abs() < 1e-9) else { continue };
+        let took_s = moments[end].0 - moments[begin].0;
+        assert!((took_s - takes_s).abs() <= 3.0 * DT_S, "{took_s} s, wanted {takes_s} s");
+        joined += 1;
+    }
+    assert!(joined >= 4, "{joined} trucks joined");
 }
 
 #[test]

@@ -34,6 +34,8 @@ fn walks_ahead(side: Side, distance_m: f64, speed_mps: f64, cover: Option<Body>)
         ignores: IgnoredRules::default(),
         meet: None,
         waits_s: None,
+        early_s: None,
+        behind_first_m: 0.0,
         siren: false,
         turn: None,
         trajectory: None,

@@ -83,7 +83,7 @@ fn judge(
                 broken[0] |= !follows(time, *next);
                 time = *next;
             }
-            Effect::Order(_) => unreachable!("the space orders nobody"),
+            Effect::Order(_) | Effect::Light(_) => unreachable!("the space orders nobody"),
             Effect::Spawn(request) if request.body == Body::Pedestrian => {
                 broken[3] |= request.speed_mps > 1.4;
                 broken[4] |= appears_too_near(request, moment);

@@ -176,19 +176,27 @@ pub fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) 
     (chosen.map_or(Choice::Pass, |row| Choice::of(row, offer(row))), all)
 }
 
-/// Lets an agent choose that asks for one row alone.
-pub(crate) fn choose_only(
-    agent: &mut dyn Agent,
-    row: usize,
-    moment: &Moment,
-    offered: &mut Offered,
-) -> Choice {
+/// Lets an agent choose that asks for a few rows alone. What became of the first one is noted.
+pub(crate) fn choose_only(agent: &mut dyn Agent, moment: &Moment, offered: &mut Offered) -> Choice {
     let table = moment.setup().table;
-    let offer = table.offer(&situation(agent, moment), row);
-    offered.note_one(table.rows().len(), row, &offer);
-    let legal = Array1::from_shape_fn(table.rows().len(), |other| other == row && offer.is_ok());
+    let situation = situation(agent, moment);
+    let rows = agent.only().to_vec();
+    let mut legal = Array1::from_elem(table.rows().len(), false);
+    let mut offers: Vec<(usize, Offer)> = Vec::new();
+    for row in rows {
+        let offer = table.offer(&situation, row);
+        if offers.is_empty() {
+            offered.note_one(table.rows().len(), row, &offer);
+        }
+        legal[row] = offer.is_ok();
+        offers.push((row, offer));
+        if legal[row] {
+            break;
+        }
+    }
     let chosen = agent.choose(moment.observation, legal.view(), &mut exploration(moment));
-    chosen.map_or(Choice::Pass, |row| Choice::of(row, offer))
+    let chosen = chosen.and_then(|row| offers.into_iter().find(|(asked, _)| *asked == row));
+    chosen.map_or(Choice::Pass, |(row, offer)| Choice::of(row, offer))
 }
 
 /// What each row would do now.

@@ -46,6 +46,11 @@ impl Run {
         match agent_named(&settings.agent)?.kind {
             Kind::Ready(build) => Run::with_agent(table, settings, Box::new(move |_| build())),
             Kind::OneRow(build) => {
+                let before: Vec<Vec<usize>> = {
+                    let space = table.space();
+                    space.rows.iter().map(|row| space.rows_before(row)).collect()
+                };
+                let build = move |row: usize| build(row, before.get(row).cloned().unwrap_or_default());
                 let mut run = Run::with_agent(table, settings, Box::new(build))?;
                 run.plan = run.arena.rows_on_roads();
                 run.settings.rows = u32::try_from(run.plan.len()).unwrap_or(u32::MAX);
@@ -130,8 +135,8 @@ impl Run {
         let mut gauges = Gauges::default();
         let mut offered = Offered::default();
         let mut choose = |moment: &Moment| {
-            if let Some(row) = agent.only() {
-                return choose_only(agent, row, moment, &mut offered);
+            if !agent.only().is_empty() {
+                return choose_only(agent, moment, &mut offered);
             }
             let offers = offers(agent, moment);
             offered.note(&offers);

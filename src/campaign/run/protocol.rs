@@ -134,19 +134,19 @@ impl Database {
             let steps = of_episode(&steps, episode, |step| step.episode);
             let contacts = of_episode(&contacts, episode, |contact| contact.episode);
             let breaches = of_episode(&breaches, episode, |breach| breach.0);
-            let begun: Vec<usize> = (0..steps.len()).filter(|at| steps[*at].action.is_some()).collect();
+            let mut begun: Vec<usize> = (0..steps.len()).filter(|at| steps[*at].action.is_some()).collect();
+            let asked = if begun.len() == 1 { None } else { self.only_row(episode)? };
+            let asked = asked.and_then(|row| labels.get(row)).map(|label| said(label));
+            // The rows before the one that was asked for make somebody appear.
+            if let Some((name, _)) = &asked {
+                begun.retain(|at| steps[*at].action.as_deref().is_some_and(|action| said(action).0 == *name));
+            }
             if begun.is_empty() {
                 let refused = of_episode(&reasons, episode, |reason| reason.0).first();
                 let mut test = ProtocolTest::without_action(episode, &road);
-                if let Some((_, row, reason)) = refused {
-                    test.refused = Some(reason.clone());
-                    let label = usize::try_from(*row).ok().and_then(|row| labels.get(row));
-                    if let Some(label) = label
-                        && self.is_of_one_row(episode)?
-                    {
-                        let (name, values) = said(label);
-                        (test.action, test.values) = (Some(name), values);
-                    }
+                test.refused = refused.map(|(_, _, reason)| reason.clone());
+                if let Some((name, values)) = asked.filter(|_| refused.is_some()) {
+                    (test.action, test.values) = (Some(name), values);
                 }
                 tests.push(test);
             }
@@ -161,10 +161,12 @@ impl Database {
         Ok(tests)
     }
 
-    /// Whether one row alone was asked for in an episode.
-    fn is_of_one_row(&self, episode: i64) -> Result<bool, DatabaseError> {
-        let query = "SELECT count(DISTINCT action_row) FROM offer WHERE episode = ?";
-        Ok(self.connection.query_row(query, [episode], |row| row.get::<_, i64>(0))? == 1)
+    /// The row that alone was asked for in an episode.
+    fn only_row(&self, episode: i64) -> Result<Option<usize>, DatabaseError> {
+        let query = "SELECT count(DISTINCT action_row), min(action_row) FROM offer WHERE episode = ?";
+        let (rows, row): (i64, Option<i64>) =
+            self.connection.query_row(query, [episode], |row| Ok((row.get(0)?, row.get(1)?)))?;
+        Ok(row.filter(|_| rows == 1).and_then(|row| usize::try_from(row).ok()))
     }
 }
 

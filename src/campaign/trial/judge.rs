@@ -11,7 +11,7 @@
 //! | drive behind | it appears behind the ego vehicle and moves, as drive ahead |
 //! | overtake | it appears behind the ego vehicle and gets wholly in front of it |
 //! | drive opposite | it appears in a lane that runs against the route, and passes the ego vehicle head-on |
-//! | cross road | it appears on a lane that is not of the route and comes onto the route's path before the ego vehicle has passed there |
+//! | cross road | it appears on a lane that is not of the route and comes onto the route's path before the ego vehicle has passed there; if it is asked to stand, it does not move at all |
 //! | walk | it appears beside the route on the asked side and walks over the route's path |
 //! | walk ahead, walk opposite | it appears beside the route where it was asked to, and walks along it that way |
 //! | stand | it stands on the route's path |
@@ -104,7 +104,12 @@ pub(super) fn verdict(
         appears(scene, request, seen)?;
         return does_phases(seen);
     }
-    let drives = || seen.frames.iter().try_for_each(|frame| stays_on_road(scene, frame));
+    // Who was told to be beside the middle of its lane may be beside the road, or on the other side of it.
+    let told_aside = request.offset_m != 0.0;
+    let drives = || match told_aside {
+        true => Ok(()),
+        false => seen.frames.iter().try_for_each(|frame| stays_on_road(scene, frame)),
+    };
     let asked = usize::from(request.then == Then::Change);
     match request.verb {
         Verb::Walk => walks(request, seen),
@@ -164,6 +169,9 @@ pub(super) fn verdict(
             {
                 return Err("it appears on the route itself".to_owned());
             }
+            if request.speed_mps == 0.0 {
+                return moves(request, seen);
+            }
             let crossing = crosses(seen)?;
             let until = Sighting { frames: seen.frames[..=crossing].to_vec(), ..*seen };
             changes(&scene.map, request, &until, [asked, asked], 0)
@@ -196,7 +204,7 @@ fn stays_on_road(scene: &Scene, frame: &Frame) -> Result<(), String> {
 fn appears_ahead(scene: &Scene, request: &SpawnRequest, first: &Frame) -> Result<(), String> {
     let front_m = VehicleParameters::MKZ.front_m(first.ego_station_m);
     let gap_m = first.route_station_m - first.outline.half_length_m - front_m;
-    if (gap_m - request.distance_m).abs() > GAP_M + GAP_PART * request.distance_m {
+    if (gap_m - request.distance_m).abs() > GAP_M + GAP_PART * request.distance_m.abs() {
         return Err(format!("it appears {gap_m:.1} m ahead instead of {:.1} m", request.distance_m));
     }
     if turned_rad(first) > core::f64::consts::FRAC_PI_2 {
@@ -376,7 +384,7 @@ fn ended(seen: &Sighting, what: &str) -> String {
             let last_s = seen.frames[seen.frames.len() - 1].after_s;
             format!("{last_s:.0} s were over before {what}")
         }
-        Ending::Arrived => format!("the ego vehicle arrived before {what}"),
+        Ending::Arrived => format!("the ego vehicle was at its goal before {what}"),
         Ending::TouchedEgo => format!("it touched the ego vehicle before {what}"),
         Ending::TouchedOther => format!("it touched another road user before {what}"),
         Ending::Left => format!("it left before {what}"),

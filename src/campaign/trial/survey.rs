@@ -5,7 +5,7 @@
 //! (with the reason), or masked (with the reasons). A row that is legal at no moment, and is about somebody who must be
 //! there, is offered after a row that makes them appear: the first after which it is legal.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 use crate::episode;
@@ -13,9 +13,9 @@ use crate::episode::{Choice, EpisodeLog};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
 use avastra_drivers::Ads;
+use avastra_lang::model::Row;
 use avastra_lang::model::command::Command;
 use avastra_lang::model::vocabulary::Phenomenon;
-use avastra_lang::model::{EffectDef, Row};
 use avastra_world::action::{ActionTable, Count, Draw, Effect, Offer, SpawnRequest};
 use avastra_world::sim::{Sensed, World};
 
@@ -146,26 +146,17 @@ impl<'a> Trials<'a> {
         rows.iter().map(judge).collect()
     }
 
-    /// The rows that make somebody appear about whom this row is: the first whom it orders, or about whom its rules ask, and
-    /// whom it does not make appear itself.
+    /// The rows that make the first one appear about whom this row is.
     fn makers(&self, row: &Row) -> Vec<usize> {
         let space = self.arena.table().space();
-        let names = |row: &Row| {
-            let spawns = space.actions[row.action].effects.iter().filter_map(|effect| match effect {
-                EffectDef::Spawn(spawn) => spawn.bearer,
-                EffectDef::Set(_) | EffectDef::Order(_) => None,
-            });
-            spawns.collect::<BTreeSet<usize>>()
-        };
-        let ordered = space.actions[row.action].effects.iter().filter_map(|effect| match effect {
-            EffectDef::Order(order) => row.bearer(order.who, &space.actions[row.action]),
-            EffectDef::Spawn(spawn) => row.bearer(spawn.of?, &space.actions[row.action]),
-            EffectDef::Set(_) => None,
-        });
-        let asked = space.clauses[row.action].iter().flat_map(|clause| clause.bearers.iter().copied());
-        let own = names(row);
-        let Some(about) = ordered.chain(asked).find(|who| !own.contains(who)) else { return Vec::new() };
-        space.rows.iter().filter(|row| names(row).contains(&about)).map(|row| row.index).collect()
+        let about = space.about(row).into_iter().next();
+        about.map_or_else(Vec::new, |who| space.makers(who).map(|row| row.index).collect())
+    }
+
+    /// A row, behind those that make everybody appear about whom it is itself.
+    fn with_makers(&self, row: usize) -> VecDeque<usize> {
+        let space = self.arena.table().space();
+        space.rows_before(&space.rows[row]).into_iter().chain([row]).collect()
     }
 
     /// A try again, as an episode that ends when the judge has seen enough.
@@ -178,13 +169,14 @@ impl<'a> Trials<'a> {
         let seen_s = judge::horizon_s(action.manoeuvres().next().is_some());
         let steps = (seen_s / space.episode.step_s).ceil() as usize;
         let label = |row: &&Row| Some(&row.label) == cell.after.as_ref();
-        let mut before = space.rows.iter().find(label).map(|row| row.index);
+        let before = space.rows.iter().find(label).map(|row| self.with_makers(row.index));
+        let mut before = before.unwrap_or_default();
         let mut choose = |moment: &episode::Moment| {
             if moment.step >= sample.step + steps {
                 return Choice::Stop;
             }
             if moment.step != sample.step {
-                return carry_out_once(table, &mut before, moment);
+                return carry_out_next(table, &mut before, moment);
             }
             Choice::of(row, table.offer(moment.situation, row))
         };
@@ -199,13 +191,14 @@ impl<'a> Trials<'a> {
             let seed = rng::child_seed(self.settings.seed, Stream::Episode, drive);
             let setup = self.arena.setup(road, seed);
             let step_ticks = (table.space().episode.step_s / avastra_world::sim::DT_S).round() as u64;
-            let (mut offered, mut open) = (Vec::new(), before);
+            let mut open = before.map_or_else(VecDeque::new, |row| self.with_makers(row));
+            let mut offered = Vec::new();
             let mut snapshots: Vec<(World, Box<dyn Ads>)> = Vec::new();
             let log = episode::run(
                 &setup,
                 &mut |moment| {
-                    offered.push(open.is_none().then(|| table.offers(moment.situation)));
-                    carry_out_once(table, &mut open, moment)
+                    offered.push(open.is_empty().then(|| table.offers(moment.situation)));
+                    carry_out_next(table, &mut open, moment)
                 },
                 &mut |world, ads, _| {
                     if world.ticks().is_multiple_of(step_ticks) {
@@ -236,7 +229,7 @@ impl<'a> Trials<'a> {
         let mut nearest_m = Vec::new();
         for number in 0..tries {
             let (moment, draw) = legal[number * legal.len() / tries];
-            let found = attempt(moment, draw);
+            let found = attempt(moment, draw, &self.arena.table().space().bearers);
             found.failure.iter().for_each(|why| Count::add(&mut failures, why));
             found.unfair.iter().for_each(|why| Count::add(&mut unfair, why));
             nearest_m.extend(found.nearest_m);
@@ -269,23 +262,24 @@ impl<'a> Trials<'a> {
     }
 }
 
-/// Carries a row out as soon as it is legal, and then lets time pass.
-fn carry_out_once(table: &ActionTable, open: &mut Option<usize>, moment: &episode::Moment) -> Choice {
-    let Some(draw) = open.and_then(|row| table.offer(moment.situation, row).ok()) else {
+/// Carries rows out one after another, each as soon as it is legal, and then lets time pass.
+fn carry_out_next(table: &ActionTable, open: &mut VecDeque<usize>, moment: &episode::Moment) -> Choice {
+    let Some(draw) = open.front().and_then(|row| table.offer(moment.situation, *row).ok()) else {
         return Choice::Pass;
     };
-    *open = None;
+    open.pop_front();
     Choice::Act(draw)
 }
 
-/// Carries a draw out and judges everything that it does.
-fn attempt(moment: &Moment, draw: &Draw) -> Try {
+/// Carries a draw out and judges everything that it does. `bearers` are the names that road users bear.
+fn attempt(moment: &Moment, draw: &Draw, bearers: &[String]) -> Try {
     let mut world = moment.world.clone();
     let mut found = Try { failure: None, unfair: None, nearest_m: None };
     let newcomers = match world.carry_out(draw) {
         Ok(newcomers) => newcomers,
         Err((nth, reason)) => {
-            let verb = if matches!(draw.effects[nth], Effect::Order(_)) { "order" } else { "spawn" };
+            let is_order = matches!(draw.effects[nth], Effect::Order(_) | Effect::Light(_));
+            let verb = if is_order { "order" } else { "spawn" };
             found.failure = Some(format!("cannot {verb}: {reason}"));
             return found;
         }
@@ -294,18 +288,26 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
     let scene = Arc::clone(world.scene());
     let ordered = draw.effects.iter().enumerate().filter_map(|(nth, effect)| match effect {
         Effect::Order(order) => Some((nth, world.bearer_id(order.bearer)?)),
-        Effect::Time(_) | Effect::Sky(..) | Effect::Spawn(_) => None,
+        Effect::Time(_) | Effect::Sky(..) | Effect::Spawn(_) | Effect::Light(_) => None,
     });
     let is_told = |request: &SpawnRequest| {
         let is_for_it =
             |effect: &Effect| matches!(effect, Effect::Order(order) if Some(order.bearer) == request.bearer);
         draw.effects.iter().any(is_for_it)
     };
-    for (nth, id) in newcomers.into_iter().chain(ordered) {
+    let watched: Vec<(usize, u32)> = newcomers.into_iter().chain(ordered).collect();
+    // Whom a failure is about, where it may be several.
+    let named = |effect: &Effect| match effect {
+        _ if watched.len() < 2 => None,
+        Effect::Spawn(request) => Some(&bearers[request.bearer?]),
+        Effect::Order(order) => Some(&bearers[order.bearer]),
+        Effect::Time(_) | Effect::Sky(..) | Effect::Light(_) => None,
+    };
+    for (nth, id) in watched.iter().copied() {
         let (request, told) = match &draw.effects[nth] {
             Effect::Spawn(request) => (Some(request), Command { turn: request.turn, ..Command::default() }),
             Effect::Order(order) => (None, order.command),
-            Effect::Time(_) | Effect::Sky(..) => continue,
+            Effect::Time(_) | Effect::Sky(..) | Effect::Light(_) => continue,
         };
         let complaint = || request.and_then(|request| fairness::complaint(&world, request, id));
         found.unfair = found.unfair.or_else(complaint);
@@ -327,7 +329,8 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
             None => judge::obeys(has_phases, &seen),
         };
         if let Err(why) = verdict {
-            found.failure.get_or_insert(why);
+            let name = named(&draw.effects[nth]).map_or_else(String::new, |name| format!("`{name}`: "));
+            found.failure.get_or_insert(format!("{name}{why}"));
         }
     }
     found

@@ -89,7 +89,7 @@ pub struct RunArguments {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
     /// Run directory, new or empty [default: the next free runs/NNNN].
-    #[arg(long)]
+    #[arg(long, short)]
     pub out: Option<PathBuf>,
     /// Put the space and its maps into `critical/space`, so that the scenarios can be moved with them.
     #[arg(long)]
@@ -145,7 +145,7 @@ pub struct EstimateArguments {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
     /// Directory, new or empty [default: the next free runs/NNNN].
-    #[arg(long)]
+    #[arg(long, short)]
     pub out: Option<PathBuf>,
     #[command(flatten)]
     pub shard: ShardArguments,
@@ -160,7 +160,7 @@ pub struct MergeArguments {
     #[arg(required = true, value_name = "DIR")]
     pub directories: Vec<PathBuf>,
     /// The directory of the whole, new or empty.
-    #[arg(long, value_name = "DIR", required_unless_present = "missing")]
+    #[arg(long, short, value_name = "DIR", required_unless_present = "missing")]
     pub out: Option<PathBuf>,
     /// Write nothing; print the numbers of the shards that are to be run again, or gone on with.
     #[arg(long, conflicts_with = "out")]

@@ -39,7 +39,7 @@ pub struct TrainArguments {
     #[command(flatten)]
     pub rules: RuleArguments,
     /// Run directory, new or empty [default: the next free runs/NNNN].
-    #[arg(long)]
+    #[arg(long, short)]
     pub out: Option<PathBuf>,
     /// Put the space and its maps into `critical/space`, so that the scenarios can be moved with them.
     #[arg(long)]
@@ -122,7 +122,7 @@ pub struct StudyArguments {
     #[arg(long, value_name = "NAME|FILE|COMMAND", value_parser = Named::ADS)]
     pub ads: Option<String>,
     /// Directory of the study, new or empty [default: the next free runs/NNNN].
-    #[arg(long)]
+    #[arg(long, short)]
     pub out: Option<PathBuf>,
     #[command(flatten)]
     pub shard: ShardArguments,

@@ -15,7 +15,7 @@ use avastra_lang::model::vocabulary::{Body, Phenomenon, TrajectoryField, Verb, W
 use avastra_lang::model::{BodyDef, Memory, Road, SPAWN_SPEED_MPS, Scenario, Space, TrajectoryDef, ticks_s};
 use avastra_lang::syntax::ast::{ExprKind, Field, ItemKind};
 use avastra_lang::syntax::print_item;
-use avastra_world::action::{Effect, OrderRequest, SpawnRequest};
+use avastra_world::action::{Effect, LightRequest, OrderRequest, SpawnRequest};
 use avastra_world::sim::VehicleParameters;
 
 /// The scenario in an exported file.
@@ -128,6 +128,10 @@ impl<'a> Actions<'a> {
             Effect::Time(time) => format!("set time = {}", time.name()),
             Effect::Sky(phenomenon, level) => format!("set sky[{}] = {}", phenomenon.name(), level.name()),
             Effect::Spawn(request) => self.spawn(space, request),
+            Effect::Light(LightRequest { colour, at_m }) => {
+                let at = at_m.map_or_else(String::new, |at_m| format!(", at: {} m", decimal(at_m, false)));
+                format!("order light {{ colour: {}{at} }}", colour.name())
+            }
             Effect::Order(OrderRequest { bearer, command, .. }) => {
                 // An order of a manoeuvre, which the text lacks, lets its bearer drive on.
                 let fields = command_fields(space, command);

@@ -13,11 +13,12 @@ use crate::model::command::{CommandDef, Told};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::rules_by_action;
 use crate::model::vocabulary::{
-    Colour, LaneChoice, Side, Site, SpaceClaim, SpawnField, Then, Turning, Verb, Word,
+    Colour, LIGHT, LaneChoice, LightColour, LightField, Side, Site, SpaceClaim, SpawnField, Then, Turning,
+    Verb, Word,
 };
 use crate::model::{
-    ActionDef, BodyWord, Domain, EffectDef, GroupDef, InRow, ManoeuvreCall, Parameter, RuleDef, SetDef, SpawnDef,
-    Type, Value, WordExpr, code,
+    ActionDef, BodyWord, Domain, EffectDef, GroupDef, InRow, LightDef, ManoeuvreCall, Parameter, RuleDef,
+    SetDef, SpawnDef, Type, Value, WordExpr, code,
 };
 use crate::prove::product_size;
 use crate::syntax::ast::{ItemKind, ParamMode, Span};
@@ -346,6 +347,9 @@ impl Checker {
                 let value = self.typed(value, place, ty)?;
                 Some(vec![EffectDef::Set(Box::new(SetDef { state: index, key, value, span: effect.span }))])
             }
+            ast::EffectKind::Order { who, fields } if who.text == LIGHT.0 => {
+                Some(vec![EffectDef::Light(Box::new(self.light(fields, place, effect.span)?))])
+            }
             ast::EffectKind::Order { who, fields } => {
                 let order = self.order(who, fields, place, effect.span)?;
                 Some(vec![EffectDef::Order(Box::new(order))])
@@ -374,7 +378,8 @@ impl Checker {
                 self.check_cover(cover.as_ref(), &spawn.verb, effect.span);
                 if of.is_some() && possible(&spawn.verb).contains(&Verb::CrossRoad) {
                     let message = "`CrossRoad` begins where it meets the ego vehicle in time, beside nobody";
-                    let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(effect.span, "spawned here");
+                    let error =
+                        Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(effect.span, "spawned here");
                     self.report(error.help(
                         "leave `of` out; several that cross one after the other are a row: `as [first, second] ahead 60 m apart 10 m`",
                     ));
@@ -399,7 +404,12 @@ impl Checker {
                     (Some(apart), names) => {
                         let apart = apart?;
                         let nth = |(nth, name)| {
-                            let row = || InRow { nth, apart: apart.clone(), count: count.clone(), named: names.len() };
+                            let row = || InRow {
+                                nth,
+                                apart: apart.clone(),
+                                count: count.clone(),
+                                named: names.len(),
+                            };
                             let row = (nth > 0).then(row);
                             one(SpawnDef { bearer: bearer(name), row, ..spawn.clone() })
                         };
@@ -408,6 +418,22 @@ impl Checker {
                 }
             }
         }
+    }
+
+    /// What the ego vehicle's next traffic light is told.
+    fn light(&mut self, fields: &[ast::Field], place: &Place<'_>, span: Span) -> Option<LightDef> {
+        self.note_fields::<LightField>(fields, place);
+        let fields = self.fields_known::<LightField>(fields);
+        let colour = match field(&fields, LightField::Colour) {
+            Some(value) => self.word::<LightColour>("colour of a light", value, place),
+            None => {
+                let message = "the order does not say what the light is to show".to_owned();
+                self.missing_field(LightField::Colour, span, message)
+            }
+        };
+        let at = field(&fields, LightField::At)
+            .map(|value| self.typed(value, place, Type::Quantity(Dimension::LENGTH)));
+        Some(LightDef { colour: colour?, at: as_written(at)? })
     }
 
     /// How many of a row appear; `Some(None)` where nothing is said.
@@ -422,7 +448,8 @@ impl Checker {
         };
         if !is_row {
             let error = Diagnostic::error(code::NOT_HERE, "`count` belongs to a row of several road users");
-            let help = "name them all, and say how far apart they are: `as [first, second] ahead 50 m apart 15 m`";
+            let help =
+                "name them all, and say how far apart they are: `as [first, second] ahead 50 m apart 15 m`";
             return self.reject(error.at(field.name.span, "there is no row").help(help));
         }
         self.typed(&field.value, place, Type::Int).map(Some)
@@ -605,6 +632,7 @@ impl Checker {
         let has = |is_so: fn(&CommandDef) -> bool| {
             manoeuvre.is_some_and(|call| self.has_command(call.manoeuvre, is_so))
         };
+        let keeps_to_ego = has(|command| command.keep.is_some() && command.to.is_none());
         let keeps = has(|command| command.keep.is_some());
         let changes_lanes = has(|command| command.lane.is_some());
         let told = manoeuvre.map_or(Told::NOTHING, |call| self.told(call.manoeuvre));
@@ -666,13 +694,14 @@ impl Checker {
                 () if verb != Verb::Walk && says(SpawnField::Waits) => {
                     ("waits at no kerb", "`waits` is for `Walk`; leave it out")
                 }
-                () if verb != Verb::CrossRoad && says(SpawnField::Early) => {
-                    ("does not meet the ego vehicle at a junction", "`early` is for `CrossRoad`, and for manoeuvres; leave it out")
-                }
+                () if verb != Verb::CrossRoad && says(SpawnField::Early) => (
+                    "does not meet the ego vehicle at a junction",
+                    "`early` is for `CrossRoad`, and for manoeuvres; leave it out",
+                ),
                 () if says(SpawnField::Meet) && says(SpawnField::Waits) => {
                     ("sets out after a time or for a meeting", "leave `waits` or `meet` out")
                 }
-                () if other_way && keeps => (
+                () if keeps_to_ego && other_way || keeps && verb == Verb::CrossRoad => (
                     "does not drive in the ego vehicle's direction",
                     "a gap is kept ahead of it or behind it; write `early` in its manoeuvre",
                 ),
@@ -862,7 +891,7 @@ impl Checker {
         let found = effects.iter().filter_map(|effect| self.effect(effect, &place)).flatten();
         let sets = found.filter_map(|effect| match effect {
             EffectDef::Set(set) => Some(*set),
-            EffectDef::Spawn(_) | EffectDef::Order(_) => None,
+            EffectDef::Spawn(_) | EffectDef::Order(_) | EffectDef::Light(_) => None,
         });
         sets.collect()
     }
@@ -989,7 +1018,7 @@ impl Checker {
 fn operations_of(effect: &EffectDef) -> usize {
     match effect {
         EffectDef::Set(set) => 1 + set.key.iter().chain([&set.value]).map(Expr::operations).sum::<usize>(),
-        EffectDef::Spawn(_) | EffectDef::Order(_) => 1,
+        EffectDef::Spawn(_) | EffectDef::Order(_) | EffectDef::Light(_) => 1,
     }
 }
 

@@ -24,7 +24,7 @@ impl BodyField {
             BodyField::Width => (Dimension::LENGTH, 0.3, 3.0),
             BodyField::Height => (Dimension::LENGTH, 0.3, 4.5),
             BodyField::Wheelbase => (Dimension::LENGTH, 0.3, 15.0),
-            BodyField::Mass => (Dimension::MASS, 10.0, 40_000.0),
+            BodyField::Mass => (Dimension::MASS, 0.1, 40_000.0),
             BodyField::Acceleration => (Dimension::ACCEL, 0.5, 8.0),
             BodyField::Deceleration => (Dimension::ACCEL, 1.0, 12.0),
         })

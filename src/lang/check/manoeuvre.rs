@@ -9,8 +9,8 @@ use crate::check::report::{Report, all_of, as_written, field};
 use crate::model::command::{CommandDef, Moves, Told};
 use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::vocabulary::{
-    Body, CHANGE, CommandField, Fact, LaneChoice, ROAD_USER, Site, SpawnField, TrafficRule, Turning, Verb,
-    Word,
+    Body, CHANGE, CommandField, Fact, LIGHT, LaneChoice, ROAD_USER, Site, SpawnField, TrafficRule, Turning,
+    Verb, Word,
 };
 use crate::model::{
     EnumDef, ManoeuvreCall, ManoeuvreDef, OrderDef, PhaseDef, REPEAT, Type, WordExpr, code, reached, told,
@@ -67,7 +67,9 @@ impl Checker {
             };
             let most = self.obeys.entry(name.text.clone()).or_default();
             *most = most.and(has);
-            if Fact::ALL.iter().any(|fact| fact.name().split('.').next() == Some(name.text.as_str())) {
+            let is_of_facts =
+                Fact::ALL.iter().any(|fact| fact.name().split('.').next() == Some(name.text.as_str()));
+            if is_of_facts || name.text == LIGHT.0 {
                 let message = format!("`{}` cannot be the name of a road user", name.text);
                 let error = Diagnostic::error(code::NOT_HERE, message);
                 self.report(error.at(name.span, "the engine's own word").help("choose another name"));
@@ -562,7 +564,9 @@ impl Checker {
         }
         self.look_at(value, place, None);
         let error = Diagnostic::error(code::TYPE_MISMATCH, "a gap is kept to a road user that has a name");
-        self.reject(error.at(value.span, "no name").help("write `to: truck`, or leave `to` out for the ego vehicle"))
+        self.reject(
+            error.at(value.span, "no name").help("write `to: truck`, or leave `to` out for the ego vehicle"),
+        )
     }
 
     /// The rules of the road that are ignored: `[Signals, Ego]`.

@@ -9,7 +9,9 @@ use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, field};
 use crate::check::road::Maps;
 use crate::model::vocabulary::{PointField, TrajectoryField, Word};
-use crate::model::{BesideRoute, Laid, Road, Trajectory, TrajectoryDef, Type, WayPoint, WordExpr, code, through};
+use crate::model::{
+    BesideRoute, Laid, Road, Trajectory, TrajectoryDef, Type, WayPoint, WordExpr, code, through,
+};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use avastra_base::geometry::{Path, Vec2};
@@ -61,7 +63,8 @@ impl Checker {
     pub(super) fn lay_trajectories(&mut self, roads: &mut [Option<Road>], maps: &mut dyn Maps) {
         for definition in self.trajectories.clone() {
             if definition.is_beside_route() {
-                let laid = self.beside_route(&definition.declared).map(|way| Laid::BesideRoute(Arc::new(way)));
+                let laid =
+                    self.beside_route(&definition.declared).map(|way| Laid::BesideRoute(Arc::new(way)));
                 roads.iter_mut().flatten().for_each(|road| road.trajectories.push(laid.clone()));
                 continue;
             }
@@ -201,7 +204,8 @@ impl Checker {
         let wrong = |checker: &mut Checker, span| {
             let message = "a point beside the route is `along` it, with an `offset` or without";
             let error = Diagnostic::error(code::MISSING_FIELD, message).at(span, "is not");
-            checker.reject(error.help("write `{ along: 12 m, offset: -3 m }`, or give the trajectory a `road`"))
+            checker
+                .reject(error.help("write `{ along: 12 m, offset: -3 m }`, or give the trajectory a `road`"))
         };
         let ast::ExprKind::Record(fields) = &item.kind else { return wrong(self, item.span) };
         let fields = self.fields_known::<PointField>(fields);

@@ -509,14 +509,8 @@ impl Command {
 
     fn told(&self) -> Told {
         let Command { lane, ignores, siren, turn, is_continuous, to, .. } = *self;
-        let words = [
-            lane.is_some(),
-            ignores.is_some(),
-            siren.is_some(),
-            turn.is_some(),
-            is_continuous,
-            to.is_some(),
-        ];
+        let words =
+            [lane.is_some(), ignores.is_some(), siren.is_some(), turn.is_some(), is_continuous, to.is_some()];
         let mut command = *self;
         let says = |figure: &Figure| (figure.value)(&mut command).is_some();
         Told::all(FIGURES.into_iter().filter(says).map(|figure| figure.field), words)

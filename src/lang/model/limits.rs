@@ -4,6 +4,8 @@
 
 use core::ops::RangeInclusive;
 
+use crate::model::vocabulary::Verb;
+
 use crate::model::command::OFFSET_M;
 use crate::model::eval::compare;
 use crate::model::expr::Comparison;
@@ -27,11 +29,23 @@ pub const EGO_ACCELERATION_MPS2_MAX: f64 = 10.0;
 /// Distances from the ego vehicle at which anything may be spawned, m.
 pub const SPAWN_DISTANCE_M: RangeInclusive<f64> = 0.0..=1000.0;
 
+/// Who drives ahead may begin beside the ego vehicle, in another lane: this far before its front at least, m.
+const BESIDE_M: f64 = -30.0;
+
+/// How far away somebody may begin who does that, m.
+pub fn spawn_distance_m(verb: Verb) -> RangeInclusive<f64> {
+    let least_m = if verb == Verb::DriveAhead { BESIDE_M } else { *SPAWN_DISTANCE_M.start() };
+    least_m..=*SPAWN_DISTANCE_M.end()
+}
+
 /// Parts of the ego vehicle's front at which somebody may be met.
 pub const MEET: RangeInclusive<f64> = 0.0..=1.0;
 
 /// Times for which somebody may wait at the kerb, s.
 pub const WAITS_S: RangeInclusive<f64> = 0.0..=600.0;
+
+/// How far before the line of a light the ego vehicle may be as that changes, m.
+pub const LIGHT_AT_M: RangeInclusive<f64> = 0.0..=1000.0;
 
 /// How much before the ego vehicle a road user may be asked to be somewhere, s; below 0 after it.
 pub const EARLY_S: RangeInclusive<f64> = -30.0..=30.0;
@@ -64,6 +78,7 @@ pub fn rounded_into(figure: f64, bounds: RangeInclusive<f64>) -> f64 {
 /// The figures of a spawn.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SpawnFigures {
+    pub verb: Option<Verb>,
     pub speed_mps: f64,
     pub distance_m: f64,
     pub offset_m: f64,
@@ -76,10 +91,11 @@ impl SpawnFigures {
     /// Why the world must not be asked for a spawn with them, whatever the rules say; `None` if it may. NaN is out of bounds,
     /// too.
     pub fn out_of_bounds(self) -> Option<String> {
-        let SpawnFigures { speed_mps, distance_m, offset_m, meet, waits_s, early_s } = self;
+        let distance_range = self.verb.map_or(SPAWN_DISTANCE_M, spawn_distance_m);
+        let SpawnFigures { speed_mps, distance_m, offset_m, meet, waits_s, early_s, .. } = self;
         let figures = [
             Some(("speed", speed_mps, "m/s", SPAWN_SPEED_MPS)),
-            Some(("distance", distance_m, "m", SPAWN_DISTANCE_M)),
+            Some(("distance", distance_m, "m", distance_range)),
             Some(("offset", offset_m, "m", OFFSET_M)),
             meet.map(|part| ("meet", part, "", MEET)),
             waits_s.map(|waits_s| ("wait", waits_s, "s", WAITS_S)),

@@ -30,14 +30,14 @@ pub mod vocabulary;
 
 pub use digest::{digest, digest_text};
 pub use eval::{
-    CROSSWALK_GAP_M_MAX, Facts, JUNCTION_AHEAD_M_MAX, LEAD_GAP_M_MAX, MomentFacts, NearFacts, NpcFacts,
-    LightTimes, OutcomeFacts, SINCE_S_MAX, SpawnFacts, TIME_S_MAX, TickFacts, WorldFacts, evaluate,
+    CROSSWALK_GAP_M_MAX, Facts, JUNCTION_AHEAD_M_MAX, LEAD_GAP_M_MAX, LightTimes, MomentFacts, NearFacts,
+    NpcFacts, OutcomeFacts, SINCE_S_MAX, SpawnFacts, TIME_S_MAX, TickFacts, WorldFacts, evaluate,
 };
 pub use interval::{End, Interval};
 pub use limits::{
-    AMBIENT_MAX, COMMANDED_MAX, EARLY_S, EGO_ACCELERATION_MPS2_MAX, LIMIT_PART_MAX, MEET, REPEAT, SIGNAL_PHASE_S,
-    SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, SpawnFigures, TICK_MS, WAITS_S,
-    rounded_into,
+    AMBIENT_MAX, COMMANDED_MAX, EARLY_S, EGO_ACCELERATION_MPS2_MAX, LIGHT_AT_M, LIMIT_PART_MAX, MEET, REPEAT,
+    SIGNAL_PHASE_S, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, SpawnFigures, TICK_MS,
+    WAITS_S, rounded_into, spawn_distance_m,
 };
 pub use meaning::Meaning;
 pub(crate) use on_route::stretches;
@@ -54,9 +54,9 @@ pub use scenario::{
 pub use sliding::Sliding;
 pub use space::{
     ACTION_ODDS_MAX, ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef,
-    GroupDef, InRow, Initial, ManoeuvreCall, ManoeuvreDef, OrderDef, Parameter, PhaseDef, RequirementDef,
-    RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef, StateDef,
-    StateMeaning, VerdictDef, WordExpr, reached, told,
+    GroupDef, InRow, Initial, LightDef, ManoeuvreCall, ManoeuvreDef, OrderDef, Parameter, PhaseDef,
+    RequirementDef, RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef,
+    StateDef, StateMeaning, VerdictDef, WordExpr, reached, told,
 };
 pub use trajectory::{BesideRoute, Laid, Trajectory, TrajectoryDef, WayPoint, through};
 pub(crate) use value::STATE_MAX;

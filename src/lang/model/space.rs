@@ -16,7 +16,8 @@ use crate::model::rules::{Bound, Clause};
 use crate::model::trajectory::{Laid, TrajectoryDef};
 use crate::model::value::{EnumIndex, Type, Value};
 use crate::model::vocabulary::{
-    Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, TrafficRule, Turning, Verb, Word,
+    Body, Colour, LaneChoice, Level, LightColour, Phenomenon, Side, Then, TimeOfDay, TrafficRule, Turning,
+    Verb, Word,
 };
 use crate::syntax::ast::Span;
 use avastra_base::units::{
@@ -211,7 +212,7 @@ impl ActionDef {
     pub(crate) fn sets(&self) -> impl Iterator<Item = &SetDef> {
         self.effects.iter().filter_map(|effect| match effect {
             EffectDef::Set(set) => Some(&**set),
-            EffectDef::Spawn(_) | EffectDef::Order(_) => None,
+            EffectDef::Spawn(_) | EffectDef::Order(_) | EffectDef::Light(_) => None,
         })
     }
 
@@ -219,14 +220,14 @@ impl ActionDef {
     pub fn spawns(&self) -> impl Iterator<Item = &SpawnDef> {
         self.effects.iter().filter_map(|effect| match effect {
             EffectDef::Spawn(spawn) => Some(&**spawn),
-            EffectDef::Set(_) | EffectDef::Order(_) => None,
+            EffectDef::Set(_) | EffectDef::Order(_) | EffectDef::Light(_) => None,
         })
     }
 
     /// The manoeuvres that it gives to road users, in the order of its effects.
     pub fn manoeuvres(&self) -> impl Iterator<Item = usize> {
         let calls = self.effects.iter().filter_map(|effect| match effect {
-            EffectDef::Set(_) => None,
+            EffectDef::Set(_) | EffectDef::Light(_) => None,
             EffectDef::Spawn(spawn) => spawn.manoeuvre.as_ref(),
             EffectDef::Order(order) => order.manoeuvre.as_ref(),
         });
@@ -237,7 +238,15 @@ impl ActionDef {
     pub(crate) fn orders(&self) -> impl Iterator<Item = &OrderDef> {
         self.effects.iter().filter_map(|effect| match effect {
             EffectDef::Order(order) => Some(&**order),
-            EffectDef::Set(_) | EffectDef::Spawn(_) => None,
+            EffectDef::Set(_) | EffectDef::Spawn(_) | EffectDef::Light(_) => None,
+        })
+    }
+
+    /// What it tells the ego vehicle's next traffic light.
+    pub(crate) fn lights(&self) -> impl Iterator<Item = &LightDef> {
+        self.effects.iter().filter_map(|effect| match effect {
+            EffectDef::Light(light) => Some(&**light),
+            EffectDef::Set(_) | EffectDef::Spawn(_) | EffectDef::Order(_) => None,
         })
     }
 
@@ -288,6 +297,7 @@ pub enum EffectDef {
     Set(Box<SetDef>),
     Spawn(Box<SpawnDef>),
     Order(Box<OrderDef>),
+    Light(Box<LightDef>),
 }
 
 /// How a state changes: all its cells, or only the cell of a key.
@@ -455,6 +465,14 @@ impl SpawnDef {
             |row: &InRow| row.nth as f64 * (length_m + evaluate(&row.apart, functions, facts).number());
         self.row.as_ref().map_or(0.0, more_m)
     }
+}
+
+/// What the ego vehicle's next traffic light is told to show.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LightDef {
+    pub colour: WordExpr<LightColour>,
+    /// How far the ego vehicle's front is before its line then, m; without it at once.
+    pub at: Option<Expr>,
 }
 
 /// What the latest bearer of a name is told to do.
@@ -641,6 +659,47 @@ impl RoadFacts {
 }
 
 impl Space {
+    /// The names of the road users about whom a row is, by whom it is ordered or beside whom somebody appears, or about whom its
+    /// rules ask, and whom it does not make appear itself.
+    pub fn about(&self, row: &Row) -> Vec<usize> {
+        let action = &self.actions[row.action];
+        let named = action.effects.iter().flat_map(|effect| match effect {
+            EffectDef::Order(order) => [Some(order.who), order.command.to],
+            EffectDef::Spawn(spawn) => [spawn.of, None],
+            EffectDef::Set(_) | EffectDef::Light(_) => [None, None],
+        });
+        let named = named.flatten().filter_map(|who| row.bearer(who, action));
+        let asked = self.clauses[row.action].iter().flat_map(|clause| clause.bearers.iter().copied());
+        let mut about = Vec::new();
+        for who in named.chain(asked) {
+            if !about.contains(&who) && !action.spawns().any(|spawn| spawn.bearer == Some(who)) {
+                about.push(who);
+            }
+        }
+        about
+    }
+
+    /// The rows that make somebody of a name appear.
+    pub fn makers(&self, bearer: usize) -> impl Iterator<Item = &Row> {
+        let makes =
+            move |row: &&Row| self.actions[row.action].spawns().any(|spawn| spawn.bearer == Some(bearer));
+        self.rows.iter().filter(makes)
+    }
+
+    /// Rows that, one after another, make everybody appear about whom a row is: for each name the first one that does.
+    pub fn rows_before(&self, row: &Row) -> Vec<usize> {
+        let (mut before, mut open) = (Vec::new(), vec![row]);
+        while let Some(next) = open.pop() {
+            for maker in self.about(next).into_iter().filter_map(|who| self.makers(who).next()) {
+                if maker.index != row.index && !before.contains(&maker.index) {
+                    before.insert(0, maker.index);
+                    open.push(maker);
+                }
+            }
+        }
+        before
+    }
+
     /// All that a step sets, in the order in which it happens: by its action, by `on … also`, and by every step. Without
     /// an action only the last is left.
     pub(crate) fn sets(&self, action: Option<usize>) -> impl Iterator<Item = &SetDef> {

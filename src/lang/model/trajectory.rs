@@ -154,8 +154,7 @@ fn spline([a, b, c, d]: [Vec2; 4], part: f64) -> Vec2 {
     let between = |from: Vec2, from_t: f64, to: Vec2, to_t: f64| {
         from * ((to_t - t) / (to_t - from_t)) + to * ((t - from_t) / (to_t - from_t))
     };
-    let (first, second, third) =
-        (between(a, 0.0, b, t_b), between(b, t_b, c, t_c), between(c, t_c, d, t_d));
+    let (first, second, third) = (between(a, 0.0, b, t_b), between(b, t_b, c, t_c), between(c, t_c, d, t_d));
     between(between(first, 0.0, second, t_c), t_b, between(second, t_b, third, t_d), t_c)
 }
 
@@ -180,7 +179,8 @@ mod tests {
         assert!((laid.path.position_at(0.0) - Vec2::new(100.0, -3.0)).norm() < 1e-9);
         let end = laid.path.position_at(laid.path.length_m());
         assert!((end - Vec2::new(160.0, 0.0)).norm() < 1e-9);
-        let straight = BesideRoute::new(&[point(0.0, 0.0), point(5.0, 0.0), point(50.0, 0.0)]).expect("straight");
+        let straight =
+            BesideRoute::new(&[point(0.0, 0.0), point(5.0, 0.0), point(50.0, 0.0)]).expect("straight");
         assert!(straight.points.iter().all(|point| point.place.y == 0.0));
     }
 

@@ -449,6 +449,16 @@ words! {
 }
 
 words! {
+    LightField "A field of `order light`.":
+    Colour "colour" = "What the ego vehicle's next traffic light shows from then on: `Red`, `Yellow` or `Green`.",
+    At "at" = "How far the ego vehicle's front is before its line then: `at: 30 m`; at once without it.",
+}
+
+/// What `order` calls the ego vehicle's next traffic light.
+pub const LIGHT: (&str, &str) =
+    ("light", "The ego vehicle's next traffic light: `order light { colour: Yellow, at: 30 m }`.");
+
+words! {
     TrajectoryField "A field of `trajectory`.":
     Road "road" = "The road on whose map it lies: `road: corner`.",
     Lanes "lanes" = "Places between which it follows the lanes: `lanes: [lane 1/-1 at 12 m, lane 7/-1 at 80 m]`.",
@@ -671,6 +681,10 @@ words! {
 
 words! {
     Turning "Where a vehicle goes at a junction.": Left, Straight, Right
+}
+
+words! {
+    LightColour "What a traffic light may be told to show.": Red, Yellow, Green
 }
 
 words! {

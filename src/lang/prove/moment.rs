@@ -159,12 +159,14 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
     if !speed.is_empty() {
         numbers.push((Fact::NpcSpeed, speed));
     }
-    let distance = enclose(&spawn.distance, known).interval().intersect(&Interval::NOT_NEGATIVE);
+    let distance = enclose(&spawn.distance, known).interval();
+    let is_ahead = matches!(distance.low, End::At(low, _) if low >= Rational::ZERO);
     let is_on_route =
         |verb: &Verb| !verb.walks_along() && !matches!(verb, Verb::Walk | Verb::CrossRoad | Verb::Follow);
     if lands
         && spawn.of.is_none()
         && spawn.offset.is_none()
+        && is_ahead
         && verbs.iter().all(is_on_route)
         && !distance.is_empty()
     {

@@ -7,8 +7,8 @@ use crate::model::command::OFFSET_M;
 use crate::model::expr::ExprKind;
 use crate::model::vocabulary::{CommandField, Word};
 use crate::model::{
-    ACTION_ODDS_MAX, ActionDef, EARLY_S, Interval, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, Type, WAITS_S,
-    code, effort,
+    ACTION_ODDS_MAX, ActionDef, EARLY_S, Interval, LIGHT_AT_M, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS,
+    Space, Type, WAITS_S, WordExpr, code, effort, spawn_distance_m,
 };
 use crate::prove::enclose::{Known, enclose};
 use crate::prove::reach::spawn_figures;
@@ -62,16 +62,21 @@ pub(crate) fn is_out(space: &Space, action: usize) -> bool {
 
 fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
     let of_spawns = space.actions[action].spawns().flat_map(|spawn| {
+        let distance_m = match &spawn.verb {
+            WordExpr::Fixed(verb) if !spawn.behind => spawn_distance_m(*verb),
+            _ => SPAWN_DISTANCE_M,
+        };
         let second = || spawn.row.as_ref().filter(|row| row.nth == 1);
         [
             Some(("speed", "a spawn", "m/s", &spawn.speed, SPAWN_SPEED_MPS)),
-            Some(("distance", "a spawn", "m", &spawn.distance, SPAWN_DISTANCE_M)),
+            Some(("distance", "a spawn", "m", &spawn.distance, distance_m)),
             spawn.offset.as_ref().map(|offset| ("offset", "a spawn", "m", offset, OFFSET_M)),
             spawn.meet.as_ref().map(|meet| ("meet", "a spawn", "", meet, MEET)),
             spawn.waits.as_ref().map(|waits| ("wait", "a spawn", "s", waits, WAITS_S)),
             spawn.early.as_ref().map(|early| ("early", "a spawn", "s", early, EARLY_S)),
             second().map(|row| ("gap", "a row", "m", &row.apart, SPAWN_DISTANCE_M)),
-            second().and_then(|row| Some(("count", "a row", "", row.count.as_ref()?, 1.0..=row.named as f64))),
+            second()
+                .and_then(|row| Some(("count", "a row", "", row.count.as_ref()?, 1.0..=row.named as f64))),
         ]
     });
     let of_spawns = of_spawns.flatten();
@@ -84,7 +89,10 @@ fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
             (figure.field.name(), "an order", figure.unit, figure.expr, bounds)
         })
     });
-    of_spawns.chain(of_orders).filter_map(move |(what, whose, unit, expr, range)| {
+    let of_lights = space.actions[action].lights();
+    let of_lights =
+        of_lights.filter_map(|light| Some(("at", "an order", "m", light.at.as_ref()?, LIGHT_AT_M)));
+    of_spawns.chain(of_orders).chain(of_lights).filter_map(move |(what, whose, unit, expr, range)| {
         let mut rows = space.rows_of(action).iter().take_while(|_| !effort::is_spent());
         let (row, found) = rows.find_map(|row| {
             let found = spawn_figures(space, row, expr)?;

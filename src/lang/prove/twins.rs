@@ -118,6 +118,10 @@ impl<'a> RowText<'a> {
                 let then = spawn.manoeuvre.as_ref().map(|then| self.call_form(then));
                 format!("{} {then:?}", spawn_form(spawn, &self.locals, &|expr| self.reduced(expr)))
             }
+            EffectDef::Light(light) => {
+                let colour = word_form(&light.colour, &|expr| self.reduced(expr));
+                format!("light {colour} {:?}", light.at.as_ref().map(|at| self.reduced(at).kind))
+            }
             EffectDef::Order(order) => {
                 let figure = |figure: WrittenFigure<'_>| {
                     format!("{:?} {:?}", figure.field, self.reduced(figure.expr).kind)

@@ -5,7 +5,7 @@
 //! needs a lower bound. The world computes the whole distance (`spawn_gap >= safety_gap`).
 
 use crate::model::rules::{Demand, RowRules};
-use crate::model::vocabulary::{Known, Verb, Word};
+use crate::model::vocabulary::{Known, LaneChoice, Verb, Word};
 use crate::model::{
     Facts, Memory, Road, Row, RulesInForce, Space, SpawnDef, Value, code, effort, evaluate, locals,
 };
@@ -60,7 +60,12 @@ fn braked_m(speed_mps: f64) -> f64 {
     stopping_m(speed_mps, CAREFUL_DELAY_S, CAREFUL_BRAKING_MPS2)
 }
 
-/// The spawn, and the gap that a driver at the road's limit needs.
+/// How fast the ego vehicle is at most, m/s: at the limit, or as fast as it is to want to be.
+fn driven_mps(road: &Road) -> f64 {
+    road.facts.limit_mps.min(road.set_mps.unwrap_or(f64::INFINITY))
+}
+
+/// The spawn, and the gap that a driver at that speed needs.
 struct Figures {
     speed_mps: f64,
     distance_m: f64,
@@ -72,8 +77,13 @@ fn figures(space: &Space, road: &Road, spawn: &SpawnDef, values: &[Value], memor
     let facts = Facts { road: Some(&road.facts), ..Facts::new(values, memory) };
     let number = |expr| evaluate(expr, &space.functions, &facts).number();
     let (speed_mps, distance_m) = (number(&spawn.speed), number(&spawn.distance));
-    let ego_mps = road.facts.limit_mps;
+    let ego_mps = driven_mps(road);
     let needed_m = match spawn.verb.word(&space.functions, &facts) {
+        // In another lane, and before another line, it is not in the way.
+        Verb::DriveAhead if spawn.lane.word(&space.functions, &facts) != LaneChoice::Current => {
+            f64::NEG_INFINITY
+        }
+        Verb::CrossRoad if speed_mps == 0.0 => f64::NEG_INFINITY,
         Verb::DriveAhead | Verb::WalkAhead => braked_m((ego_mps - speed_mps).max(0.0)),
         Verb::DriveOpposite | Verb::WalkOpposite => {
             braked_m(ego_mps) + speed_mps * (CAREFUL_DELAY_S + ego_mps / CAREFUL_BRAKING_MPS2)
@@ -105,8 +115,9 @@ fn remark(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef, found: &Witne
             format!("{} in `{}`", shown(figures.distance_m, Dimension::LENGTH), row.label),
         )
         .note(format!(
-            "a careful driver at {}, the limit of `{}`, needs {} for a `{}` at {}",
-            shown(road.facts.limit_mps, Dimension::SPEED),
+            "a careful driver at {}, the {} of `{}`, needs {} for a `{}` at {}",
+            shown(driven_mps(road), Dimension::SPEED),
+            if driven_mps(road) < road.facts.limit_mps { "`set_speed`" } else { "limit" },
             road.name,
             shown(figures.needed_m, Dimension::LENGTH),
             verb.name(),

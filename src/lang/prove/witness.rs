@@ -17,9 +17,9 @@ use crate::model::command::OFFSET_M;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Before, Candidate, Choose, Demand, Nearest, Room, RowRules, cells_read};
 use crate::model::{
-    ActionDef, Domain, End, Facts, Interval, Memory, Parameter, Road, Row, RulesInForce, SPAWN_DISTANCE_M,
-    SPAWN_SPEED_MPS, SetDef, Space, SpawnFacts, SpawnFigures, Type, Value, WorldFacts, effort, evaluate,
-    locals, rounded_into,
+    ActionDef, Domain, End, Facts, Interval, Memory, Parameter, Road, Row, RulesInForce, SPAWN_SPEED_MPS,
+    SetDef, Space, SpawnFacts, SpawnFigures, Type, Value, WorldFacts, effort, evaluate, locals, rounded_into,
+    spawn_distance_m,
 };
 use crate::prove::enclose::{Known, Values};
 use crate::prove::moment::{Case, may_hold_together, newcomers};
@@ -306,15 +306,17 @@ impl Search<'_> {
             let body = spawn.body.word(&space.functions, &facts);
             let shape = body.own.map_or_else(|| parameters(body.like), |own| space.bodies[own].shape);
             let more_m = spawn.behind_first_m(shape.length_m, &space.functions, &facts);
-            let distance_m = rounded_into(number(&spawn.distance) + more_m, SPAWN_DISTANCE_M);
+            let verb = spawn.verb.word(&space.functions, &facts);
+            let distance_m = rounded_into(number(&spawn.distance) + more_m, spawn_distance_m(verb));
             let offset_m = spawn.offset.as_ref().map_or(0.0, |offset| rounded_into(number(offset), OFFSET_M));
-            let figures = SpawnFigures { speed_mps, distance_m, offset_m, ..SpawnFigures::default() };
+            let figures =
+                SpawnFigures { verb: Some(verb), speed_mps, distance_m, offset_m, ..SpawnFigures::default() };
             if figures.out_of_bounds().is_some() {
                 return false;
             }
             // The spawn lands where it was asked to, and no gap is unfair. How far away somebody else is beside whom it is asked
             // for, or a trajectory, nobody knows here.
-            let is_elsewhere = spawn.of.is_some() || spawn.trajectory.is_some();
+            let is_elsewhere = spawn.of.is_some() || spawn.trajectory.is_some() || distance_m < 0.0;
             let spawn_gap_m = if is_elsewhere { f64::INFINITY } else { distance_m };
             spawns.push(SpawnFacts { spawn_gap_m, ..SpawnFacts::default() });
         }
@@ -422,7 +424,11 @@ impl Search<'_> {
         }
         for spawn in self.action().spawns() {
             let count = spawn.row.as_ref().and_then(|row| row.count.as_ref());
-            [&spawn.speed, &spawn.distance].into_iter().chain(&spawn.offset).chain(count).for_each(&mut named);
+            [&spawn.speed, &spawn.distance]
+                .into_iter()
+                .chain(&spawn.offset)
+                .chain(count)
+                .for_each(&mut named);
         }
         for (_, demand) in self.rules.demands() {
             match demand {

@@ -370,7 +370,10 @@ pub enum Place {
     /// From the beginning of a trajectory.
     On(Box<Expr>),
     /// On a trajectory that lies beside the ego vehicle's route, ahead of it or behind it.
-    Along { trajectory: Box<Expr>, behind: bool },
+    Along {
+        trajectory: Box<Expr>,
+        behind: bool,
+    },
 }
 
 impl Place {

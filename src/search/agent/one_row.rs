@@ -7,31 +7,39 @@ use avastra_base::rng::Rng;
 
 use super::registry::Agent;
 
-/// Chooses its row as soon as that is legal, and nothing after that.
+/// Chooses its row as soon as that is legal, and nothing after that. Until then it chooses the rows that make the road users
+/// appear about whom its row is, one after another.
 #[derive(Debug)]
 pub struct OneRow {
-    row: usize,
-    was_chosen: bool,
+    /// Its own row, and those before it.
+    rows: Vec<usize>,
+    /// Those that are still to be chosen.
+    open: Vec<usize>,
 }
 
 impl OneRow {
-    pub fn new(row: usize) -> OneRow {
-        OneRow { row, was_chosen: false }
+    pub fn new(row: usize, before: Vec<usize>) -> OneRow {
+        let rows: Vec<usize> = [row].into_iter().chain(before).collect();
+        OneRow { open: rows.clone(), rows }
     }
 }
 
 impl Agent for OneRow {
     fn begin(&mut self) {
-        self.was_chosen = false;
+        self.open.clone_from(&self.rows);
     }
 
     fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
-        let chooses = !self.was_chosen && legal[self.row];
-        self.was_chosen |= chooses;
-        chooses.then_some(self.row)
+        let chosen = self.open.iter().position(|row| legal[*row])?;
+        let row = self.open.remove(chosen);
+        if chosen == 0 && row == self.rows[0] {
+            self.open.clear();
+        }
+        Some(row)
     }
 
-    fn only(&self) -> Option<usize> {
-        Some(self.row)
+    fn only(&self) -> &[usize] {
+        // Of its own row it wants to know why it cannot be, of the next one before it whether it can.
+        if self.open.is_empty() { &self.rows[..1] } else { &self.open }
     }
 }

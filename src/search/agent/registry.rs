@@ -42,9 +42,9 @@ pub trait Agent: Send {
         true
     }
 
-    /// The one row that it may choose, if it asks nothing about the others.
-    fn only(&self) -> Option<usize> {
-        None
+    /// The rows that it may choose now, the one that it wants first; none if it asks about all.
+    fn only(&self) -> &[usize] {
+        &[]
     }
 
     /// A step begins: the seed for its draws, or `None` if they come from the episode's own.
@@ -86,8 +86,8 @@ pub struct Entry {
 pub enum Kind {
     /// It can act at once: a fresh one for each episode.
     Ready(fn() -> Box<dyn Agent>),
-    /// It plays a row of the table: a fresh one for each episode and row.
-    OneRow(fn(usize) -> Box<dyn Agent>),
+    /// It plays a row of the table, behind others that it needs: a fresh one for each episode and row.
+    OneRow(fn(usize, Vec<usize>) -> Box<dyn Agent>),
     /// It must be trained: its presets, the default first. See [`super::Learner`].
     Learning(&'static [Preset]),
     /// It searches over many episodes, and what it found can act: how its settings are made from changes by name.
@@ -119,8 +119,8 @@ pub const REGISTRY: &[Entry] = &[
     },
     Entry {
         name: "every-row",
-        summary: "each row once on each road on which its rules let it run, in an episode of its own: a protocol",
-        kind: Kind::OneRow(|row| Box::new(one_row::OneRow::new(row))),
+        summary: "each row once on each road on which its rules let it run, in an episode of its own, behind the rows that make its road users appear: a protocol",
+        kind: Kind::OneRow(|row, before| Box::new(one_row::OneRow::new(row, before))),
     },
     Entry {
         name: "ddqn",
@@ -200,7 +200,7 @@ mod tests {
         let rows = || Arc::new(Rows { allowed: vec![true; ROWS], environment: vec![false; ROWS] });
         match entry.kind {
             Kind::Ready(build) => vec![(build(), entry.name != "random-raw")],
-            Kind::OneRow(build) => vec![(build(1), true)],
+            Kind::OneRow(build) => vec![(build(1, Vec::new()), true)],
             Kind::Learning(presets) => {
                 let learner = |preset: &Preset| -> (Box<dyn Agent>, bool) {
                     let settings = (preset.settings)();

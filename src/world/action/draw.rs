@@ -6,7 +6,9 @@ use std::sync::Arc;
 use crate::action::course::Part;
 use crate::action::later::Later;
 use crate::action::table::{Draw, Refusal, Situation};
-use crate::action::{Course, Effect, LaneChangeRules, OnTrajectory, OrderRequest, SpawnRequest};
+use crate::action::{
+    Course, Effect, LaneChangeRules, LightRequest, OnTrajectory, OrderRequest, SpawnRequest,
+};
 use crate::sim::VehicleParameters;
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
@@ -18,9 +20,9 @@ use avastra_lang::model::rules::{
 };
 use avastra_lang::model::vocabulary::Verb;
 use avastra_lang::model::{
-    ActionDef, BodyWord, Domain, EARLY_S, EffectDef, Facts, MEET, ManoeuvreCall, Memory, MomentFacts, NpcFacts,
-    OrderDef, Parameter, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WAITS_S,
-    WorldFacts, evaluate, locals, reached, rounded_into, told,
+    ActionDef, BodyWord, Domain, EARLY_S, EffectDef, Facts, LIGHT_AT_M, LightDef, MEET, ManoeuvreCall,
+    Memory, MomentFacts, NpcFacts, OrderDef, Parameter, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value,
+    WAITS_S, WorldFacts, evaluate, locals, reached, rounded_into, spawn_distance_m, told,
 };
 
 /// Draws of one row in a step before the row is refused. Every draw obeys what can be known before; a further one
@@ -160,7 +162,7 @@ impl<'a> Judge<'a> {
         let mut spawns = Vec::new();
         let mut spawn_defs = self.happening(values, &after).filter_map(|effect| match effect {
             EffectDef::Spawn(spawn) => Some(spawn),
-            EffectDef::Set(_) | EffectDef::Order(_) => None,
+            EffectDef::Set(_) | EffectDef::Order(_) | EffectDef::Light(_) => None,
         });
         for (nth, effect) in effects.iter().enumerate() {
             if refusals.len() >= refusals_max {
@@ -172,6 +174,11 @@ impl<'a> Judge<'a> {
                     refusals.extend(self.order_refusal(order, &effects[..nth]));
                     continue;
                 }
+                Effect::Light(light) => {
+                    let refusal = self.situation.surroundings.light_refusal(light);
+                    refusals.extend(refusal.map(|reason| refuse(None, reason)));
+                    continue;
+                }
                 Effect::Time(_) | Effect::Sky(..) => {
                     let refusal =
                         self.situation.surroundings.weather_refusal().map(|reason| refuse(None, reason));
@@ -181,7 +188,8 @@ impl<'a> Judge<'a> {
                 }
             };
             let is_beside = spawn_defs.next().is_some_and(|spawn| spawn.of.is_some());
-            if is_beside && (request.distance_m.is_nan() || request.distance_m < 0.0) {
+            let least_m = *spawn_distance_m(request.verb).start();
+            if is_beside && (request.distance_m.is_nan() || request.distance_m < least_m) {
                 let why = if request.distance_m.is_nan() { ABSENT } else { PASSED };
                 refusals.push(refuse(None, format!("cannot spawn: {why}")));
                 continue;
@@ -232,7 +240,7 @@ impl<'a> Judge<'a> {
         let of_road_users = |effect: &Effect| matches!(effect, Effect::Spawn(_) | Effect::Order(_));
         let places = effects.iter().enumerate().filter(|(_, effect)| of_road_users(effect)).map(|(at, _)| at);
         let calls = self.happening(values, after).filter_map(|effect| match effect {
-            EffectDef::Set(_) => None,
+            EffectDef::Set(_) | EffectDef::Light(_) => None,
             EffectDef::Spawn(spawn) => Some(spawn.manoeuvre.as_ref()),
             EffectDef::Order(order) => Some(order.manoeuvre.as_ref()),
         });
@@ -268,13 +276,19 @@ impl<'a> Judge<'a> {
         Facts { road: self.row.road, ..Facts::new(values, memory) }
     }
 
-    /// The effects of the action, without the spawns of which a row has fewer.
-    fn happening<'f>(&'f self, values: &'f [Value], after: &'f Memory) -> impl Iterator<Item = &'f EffectDef> {
+    /// The effects of the action, without those about whom a row has fewer.
+    fn happening<'f>(
+        &'f self,
+        values: &'f [Value],
+        after: &'f Memory,
+    ) -> impl Iterator<Item = &'f EffectDef> {
+        let appears = |spawn: &SpawnDef| spawn.appears(&self.row.space.functions, &self.facts(values, after));
+        let missing = self.action.spawns().filter(|spawn| !appears(spawn)).filter_map(|spawn| spawn.bearer);
+        let missing: Vec<usize> = missing.collect();
         self.action.effects.iter().filter(move |effect| match effect {
-            EffectDef::Spawn(spawn) => {
-                spawn.appears(&self.row.space.functions, &self.facts(values, after))
-            }
-            EffectDef::Set(_) | EffectDef::Order(_) => true,
+            EffectDef::Spawn(spawn) => appears(spawn),
+            EffectDef::Order(order) => !missing.contains(&order.who.bearer(values)),
+            EffectDef::Set(_) | EffectDef::Light(_) => true,
         })
     }
 
@@ -298,6 +312,7 @@ impl<'a> Judge<'a> {
                 }
                 EffectDef::Spawn(spawn) => effects.push(Effect::Spawn(self.request(spawn, locals, after))),
                 EffectDef::Order(order) => effects.push(Effect::Order(self.order(order, locals, after))),
+                EffectDef::Light(light) => effects.push(Effect::Light(self.light(light, locals, after))),
             }
         }
         effects
@@ -376,7 +391,7 @@ impl<'a> Judge<'a> {
             speed_mps: rounded_into(evaluate(&spawn.speed, functions, &facts).number(), SPAWN_SPEED_MPS),
             distance_m: match spawn.of {
                 _ if begins_m.is_some() => 0.0,
-                None => rounded_into(asked_m, SPAWN_DISTANCE_M),
+                None => rounded_into(asked_m, spawn_distance_m(verb)),
                 Some(of) => self.beside_m(of, spawn, asked_m, shape.length_m, verb, locals),
             },
             cover: cover.map(|cover| cover.like),
@@ -414,11 +429,19 @@ impl<'a> Judge<'a> {
         OrderRequest { bearer: order.who.bearer(locals), command, phases }
     }
 
+    fn light(&self, light: &LightDef, locals: &[Value], after: &Memory) -> LightRequest {
+        let (functions, facts) = (&self.row.space.functions, self.facts(locals, after));
+        let at_m = |at: &Expr| rounded_into(evaluate(at, functions, &facts).number(), LIGHT_AT_M);
+        LightRequest { colour: light.colour.word(functions, &facts), at_m: light.at.as_ref().map(at_m) }
+    }
+
     /// Why an order cannot be given after the effects before it. Somebody whom one of them spawns under that name is there.
     fn order_refusal(&self, order: &OrderRequest, before: &[Effect]) -> Option<Refusal> {
         let spawned = before.iter().rev().find_map(|effect| match effect {
             Effect::Spawn(request) if request.bearer == Some(order.bearer) => Some(request.verb),
-            Effect::Spawn(_) | Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) => None,
+            Effect::Spawn(_) | Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) | Effect::Light(_) => {
+                None
+            }
         });
         let impossible = || match spawned {
             Some(verb) => order.impossible(verb),

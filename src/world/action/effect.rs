@@ -4,7 +4,7 @@ use avastra_lang::model::body::OwnBody;
 use avastra_lang::model::command::{Command, IgnoredRules, Told};
 use avastra_lang::model::expr::Expr;
 use avastra_lang::model::vocabulary::{
-    Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Turning, Verb,
+    Body, Colour, LaneChoice, Level, LightColour, Phenomenon, Side, Then, TimeOfDay, Turning, Verb,
 };
 use avastra_lang::model::{
     Memory, MomentFacts, NpcFacts, Space, SpawnFacts, SpawnFigures, StateDef, StateMeaning,
@@ -20,6 +20,15 @@ pub enum Effect {
     Sky(Phenomenon, Level),
     Spawn(SpawnRequest),
     Order(OrderRequest),
+    Light(LightRequest),
+}
+
+/// What the ego vehicle's next traffic light is to show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LightRequest {
+    pub colour: LightColour,
+    /// How far the ego vehicle's front is before its line then, m; `None`: at once.
+    pub at_m: Option<f64>,
 }
 
 /// What the latest bearer of a name is told to do.
@@ -96,8 +105,8 @@ pub struct OnTrajectory {
 
 impl SpawnRequest {
     pub fn figures(&self) -> SpawnFigures {
-        let SpawnRequest { speed_mps, distance_m, offset_m, meet, waits_s, early_s, .. } = *self;
-        SpawnFigures { speed_mps, distance_m, offset_m, meet, waits_s, early_s }
+        let SpawnRequest { verb, speed_mps, distance_m, offset_m, meet, waits_s, early_s, .. } = *self;
+        SpawnFigures { verb: Some(verb), speed_mps, distance_m, offset_m, meet, waits_s, early_s }
     }
 }
 
@@ -127,7 +136,7 @@ impl Effect {
     pub fn own_bodies(&self, first: u32) -> impl Iterator<Item = (u32, usize)> {
         let own = match self {
             Effect::Spawn(request) => [request.own, request.cover_own],
-            Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) => [None, None],
+            Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) | Effect::Light(_) => [None, None],
         };
         (first..).zip(own).filter_map(|(id, own)| Some((id, own?.index)))
     }
@@ -136,7 +145,7 @@ impl Effect {
     pub fn newcomers(&self) -> u32 {
         match self {
             Effect::Spawn(request) => 1 + u32::from(request.cover.is_some()),
-            Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) => 0,
+            Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) | Effect::Light(_) => 0,
         }
     }
 }
@@ -180,6 +189,11 @@ pub trait Surroundings {
 
     /// Why an order cannot be given now, in words that complete "cannot order `NAME`: …".
     fn order_refusal(&self, _order: &OrderRequest) -> Option<String> {
+        None
+    }
+
+    /// Why an order to the ego vehicle's next traffic light cannot be given now, in words.
+    fn light_refusal(&self, _light: &LightRequest) -> Option<String> {
         None
     }
 

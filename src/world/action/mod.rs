@@ -29,7 +29,9 @@ pub use audit::{Audit, Enforcement, RuleAudit, audit};
 pub use avastra_lang::model::SpawnFacts;
 pub use count::Count;
 pub use course::Course;
-pub use effect::{Effect, LaneChangeRules, OnTrajectory, OrderRequest, SpawnRequest, Surroundings};
+pub use effect::{
+    Effect, LaneChangeRules, LightRequest, OnTrajectory, OrderRequest, SpawnRequest, Surroundings,
+};
 pub use file::{AxisRecord, DrawRecord, RoadRecord, RowRecord, RuleRecord, TableFile};
 pub use later::LaterMoment;
 pub use table::{ActionTable, Draw, Offer, Refusal, RowOdds, Situation};

@@ -5,8 +5,7 @@ use avastra_base::geometry::Vec2;
 use avastra_lang::model::vocabulary::{Fact, Light, Priority, Turn, WordFact};
 use avastra_lang::model::{
     CROSSWALK_GAP_M_MAX, JUNCTION_AHEAD_M_MAX, LIGHT_AHEAD_M, LightTimes, MomentFacts, NpcFacts, OnRoute,
-    TIME_S_MAX,
-    junction_ahead,
+    TIME_S_MAX, junction_ahead,
 };
 
 use super::around::Around;

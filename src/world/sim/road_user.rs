@@ -11,7 +11,7 @@ use avastra_lang::model::vocabulary::{Body, Colour, TrafficRule, Verb};
 use avastra_road::is_apart;
 
 use super::ambient::COMMANDED_MAX;
-use super::around::Around;
+use super::around::{Around, Other};
 use super::body::BodyParameters;
 use super::guided::Guided;
 use super::npc::{Driver, View};
@@ -460,8 +460,13 @@ impl RoadUser {
 
     /// Whether every other road user, the ego vehicle included, is at least `room_m` away.
     pub fn has_room(&self, around: &Around, room_m: f64) -> bool {
+        self.who_is_there(around, room_m).is_none()
+    }
+
+    /// The first one that leaves it no such room; the ego vehicle before all others.
+    pub fn who_is_there<'a>(&self, around: &'a Around, room_m: f64) -> Option<Other<'a>> {
         let this = &self.obstacle;
-        !around.others().any(|other| {
+        around.others().find(|other| {
             distance_m(&this.outline, other.outline) < room_m
                 && !is_apart(this.elevation_m, other.elevation_m)
         })

@@ -6,6 +6,7 @@
 //! 5 s. Counted in ticks, so that the colour of any moment is exact. No vehicle detection, no pedestrian
 //! lights.
 
+use avastra_lang::model::vocabulary::LightColour;
 use avastra_road::RoadMap;
 
 use super::sense::SignalColour;
@@ -75,6 +76,24 @@ impl SignalClock {
         }
     }
 
+    /// From a tick on the signal shows a colour, as if that had begun then. The cycles of all others jump with it.
+    pub fn jump(&mut self, map: &RoadMap, signal: usize, tick: u64, colour: LightColour) {
+        let Cycle { at, green, all } = self.cycle(map, signal, tick);
+        let to = match colour {
+            LightColour::Green => 0,
+            LightColour::Yellow => green,
+            LightColour::Red => green + YELLOW_TICKS,
+        };
+        self.offset_ticks = (self.offset_ticks + (to + all - at) % all) % ticks(REPEAT_S);
+    }
+
+    /// A signal that would have another colour at a tick keeps the one before that for a tick more, and all others with it.
+    pub fn stay(&mut self, map: &RoadMap, signal: usize, tick: u64) {
+        if self.around(map, signal, tick).0 == 0 {
+            self.offset_ticks = self.offset_ticks.checked_sub(1).unwrap_or(ticks(REPEAT_S) - 1);
+        }
+    }
+
     fn cycle(&self, map: &RoadMap, signal: usize, tick: u64) -> Cycle {
         let signal = &map.signals[signal];
         // A light on its own (at a zebra crossing) alternates with an unseen group.
@@ -96,6 +115,7 @@ impl SignalClock {
 mod tests {
     use super::*;
     use crate::sim::testing;
+    use avastra_lang::model::vocabulary::Word;
 
     #[test]
     fn a_cycle_is_bounded() {
@@ -105,6 +125,29 @@ mod tests {
             assert!((cycle_s - expected_s).abs() < 0.2, "{cycles_s:?}");
         }
         assert_eq!(green_ticks(20), ticks(GREEN_S_MIN));
+    }
+
+    #[test]
+    fn what_is_said_of_a_colour_s_time_is_so() {
+        let map = testing::crossing().map.clone();
+        let mut clock = SignalClock::new(0.0);
+        for tick in (0..4000).step_by(7) {
+            let (since, left) = clock.around(&map, 0, tick + 4000);
+            let colour = |tick| clock.colour(&map, 0, tick + 4000);
+            let now = colour(tick);
+            assert!((tick - since.min(tick)..tick + left).all(|near| colour(near) == now), "{tick}");
+            assert!(
+                clock.colour(&map, 0, tick + 4000 - since - 1) != now && colour(tick + left) != now,
+                "{tick}"
+            );
+        }
+        for to in LightColour::ALL {
+            clock.jump(&map, 0, 500, *to);
+            assert_eq!(clock.colour(&map, 0, 500).name(), to.name().to_lowercase());
+            assert_eq!(clock.around(&map, 0, 500).0, 0);
+            clock.stay(&map, 0, 500);
+            assert_ne!(clock.colour(&map, 0, 500).name(), to.name().to_lowercase());
+        }
     }
 
     #[test]

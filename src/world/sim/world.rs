@@ -16,7 +16,7 @@ use avastra_base::rng;
 use avastra_base::rng::Stream;
 use avastra_lang::model::body::BodyParameters;
 use avastra_lang::model::command::Command;
-use avastra_lang::model::vocabulary::{Body, Level, TimeOfDay, TrafficRule};
+use avastra_lang::model::vocabulary::{Body, Level, LightColour, TimeOfDay, TrafficRule};
 use avastra_lang::model::{COMMANDED_MAX, Memory, NpcFacts, Road, Space, TICK_MS};
 use avastra_road::{RouteLaneChange, is_apart};
 
@@ -110,6 +110,15 @@ impl Start {
     }
 }
 
+/// What a traffic light was told to show, once the ego vehicle's front is at that station.
+#[derive(Debug, Clone, Copy)]
+struct Switch {
+    /// In `RoadMap::signals`.
+    signal: usize,
+    colour: LightColour,
+    at_m: f64,
+}
+
 /// The whole state of an episode: `Clone` is a snapshot.
 #[derive(Debug, Clone)]
 pub struct World {
@@ -127,6 +136,8 @@ pub struct World {
     environment: Environment,
     conditions: Conditions,
     signals: SignalClock,
+    /// What a light was told to show.
+    switch: Option<Switch>,
     /// In order of appearance.
     users: Vec<RoadUser>,
     next_id: u32,
@@ -171,6 +182,7 @@ impl World {
             conditions: environment.conditions(speed_mps),
             environment,
             signals: SignalClock::new(start.signal_phase_s),
+            switch: None,
             users: Vec::with_capacity(COMMANDED_MAX as usize),
             next_id: 1,
             ambient: Ambient::new(start.ambient),
@@ -227,6 +239,7 @@ impl World {
         self.users = users;
         self.measure();
         self.ticks += 1;
+        self.switch_light();
         if self.ambient.wanted > 0 && self.ticks.is_multiple_of(RENEWAL_TICKS) {
             self.renew_ambient(false);
         }
@@ -434,6 +447,10 @@ impl World {
         self.environment.trace(trace);
         trace.number(self.conditions.friction);
         self.signals.trace(trace);
+        if let Some(Switch { signal, colour, at_m }) = self.switch {
+            trace.words([signal as u64, colour as u64]);
+            trace.number(at_m);
+        }
         trace.word(u64::from(self.next_id));
         self.ambient.trace(trace);
         trace.words([self.weather_tick, self.seed]);

@@ -98,7 +98,9 @@ impl<'a> Cast<'a> {
                 let known = request.trajectory.and_then(|on| self.road.trajectories[on.index].as_ref());
                 let trajectory = match known {
                     Some(Laid::OnMap(trajectory)) => trajectory.as_ref(),
-                    Some(Laid::BesideRoute(_)) => return does("follows a way beside the ego vehicle's route"),
+                    Some(Laid::BesideRoute(_)) => {
+                        return does("follows a way beside the ego vehicle's route");
+                    }
                     None => return does("follows a way of another map"),
                 };
                 if !trajectory.turns.is_empty() {

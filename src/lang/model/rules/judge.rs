@@ -287,21 +287,25 @@ impl<'a> RowRules<'a> {
             }
             (None, _) => {}
         }
+        let is_there = |who: &usize| {
+            facts.world.is_some_and(|world| world.bearers.iter().any(|(known, _)| known == who))
+        };
         let lacks_a_side = |kind: &ExprKind| match kind {
             ExprKind::Compare(_, left, right) => has_no_value(left) || has_no_value(right),
             ExprKind::InRange(inner, _, _) => has_no_value(inner),
+            ExprKind::IsWordOf(who, ..) => !is_there(&who.bearer(candidate.values)),
             _ => false,
         };
         if condition.any(lacks_a_side) {
-            let is_there = |who: &usize| {
-                facts.world.is_some_and(|world| world.bearers.iter().any(|(known, _)| known == who))
-            };
             let absent = condition
                 .asked()
                 .into_iter()
                 .map(|who| who.bearer(candidate.values))
                 .find(|who| !is_there(who));
             let why = match absent {
+                Some(who) if self.space.actions[self.row.action].spawns().any(|spawn| spawn.bearer == Some(who)) => {
+                    format!("no earlier `{}` is there (the one that appears is `npc`)", self.space.bearers[who])
+                }
                 Some(who) => format!("`{}` is not there", self.space.bearers[who]),
                 None => "a division by 0 has no value".to_owned(),
             };

@@ -44,10 +44,7 @@ enum Aim {
     Gap(Gap, Option<u32>),
     /// Its front is there so much before that of the ego vehicle, s: at this station of the ego vehicle's route, or where its way
     /// crosses that.
-    Place {
-        early_s: f64,
-        station_m: Option<f64>,
-    },
+    Place { early_s: f64, station_m: Option<f64> },
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -227,10 +224,14 @@ fn ways_to(view: &View, station_m: f64) -> (f64, f64) {
 /// Where the road user of that id, or the ego vehicle, is; `None` if that one is not there any more.
 fn beside(view: &View, to: Option<u32>) -> Option<Beside> {
     let View { this, around, .. } = *view;
+    // Two that come towards the ego vehicle count the other way.
+    let (_, _, along) = around.beside_route(this.outline.pose.position);
+    let sign = if to.is_some() && along.dot(&this.forward) < 0.0 { -1.0 } else { 1.0 };
     // The middle, half the length, and the speed.
     let along_route = |one: &Obstacle| {
         let (middle_m, _, along) = around.beside_route(one.outline.pose.position);
-        (middle_m, one.outline.half_extent_m(one.forward, along).0, along.dot(&one.velocity_mps))
+        let half_length_m = one.outline.half_extent_m(one.forward, along).0;
+        (sign * middle_m, half_length_m, sign * along.dot(&one.velocity_mps))
     };
     let (mut here_m, half_length_m, own_mps) = along_route(this);
     let (front_m, rear_m, other_mps) = match to {

@@ -4,6 +4,7 @@
 use avastra_lang::model::vocabulary::{Side, Then, TrafficRule};
 use avastra_road::{Conflict, LaneIndex, StopLine};
 
+use crate::sim::around::Around;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::lanes::lane_beside;
 use crate::sim::npc::{Driver, PlannedChange, Towards, When, can_change, choices};
@@ -18,6 +19,8 @@ use super::{Asked, commanded};
 const CROSSING_M: f64 = 60.0;
 /// Nobody who is to be somewhere before the ego vehicle comes from farther away than this time, s.
 const ARRIVAL_S_MAX: f64 = 120.0;
+/// Who stands at a line stands this far before it, m.
+const BEFORE_LINE_M: f64 = 1.0;
 /// A stop line within this distance behind a newcomer counts as passed when it appears, m.
 const BEYOND_LINE_M: f64 = 30.0;
 /// How long a vehicle stands at a stop sign, s, and its braking before it, m/s². Ours, and that of the drivers' model.
@@ -37,13 +40,21 @@ pub(super) fn cross_road(asked: &Asked) -> Result<Driver, String> {
         {
             continue;
         }
+        if request.speed_mps == 0.0 {
+            match standing(asked, conflict) {
+                Ok(driver) => return Ok(driver),
+                Err(why) => reason = Some(why),
+            }
+            continue;
+        }
         let arrival_s = match request.early_s {
             None => arrivals.after_s(around, distance_m),
             // Infinite while the ego vehicle stands.
             Some(early_s) => match distance_m / around.ego.speed_mps - early_s {
                 arrival_s if (0.0..=ARRIVAL_S_MAX).contains(&arrival_s) => arrival_s,
                 _ => {
-                    reason = Some("the ego vehicle, at its present speed, is not there at that time".to_owned());
+                    reason =
+                        Some("the ego vehicle, at its present speed, is not there at that time".to_owned());
                     continue;
                 }
             },
@@ -63,11 +74,30 @@ pub(super) fn cross_road(asked: &Asked) -> Result<Driver, String> {
     }))
 }
 
-/// A driver that reaches a conflict after `arrival_s`, when the ego vehicle does, if nothing is in its way.
-fn rendezvous(asked: &Asked, conflict: &Conflict, arrival_s: f64) -> Result<Driver, String> {
+/// A driver that stands at the line before a junction, or where the junction begins, on a way through a conflict.
+fn standing(asked: &Asked, conflict: &Conflict) -> Result<Driver, String> {
     let Asked { around, request, size, id, .. } = *asked;
+    if request.early_s.is_some() {
+        return Err("who stands is there at no time".into());
+    }
+    let lanes = lanes_to(around, conflict, BEYOND_LINE_M + request.behind_first_m + size.length_m);
+    let mut rng = choices(around.seed, id, 0);
+    let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
+    let enters_m = way.lane_begin_m(conflict.lane).expect("the way was made through this lane");
+    let before = enters_m - BEYOND_LINE_M..=enters_m;
+    let lines = way.stop_lines.iter().map(|line| line.station_m).chain(way.stop_signs_m.iter().copied());
+    let line_m = lines.filter(|line_m| before.contains(line_m)).fold(f64::NEG_INFINITY, f64::max);
+    let line_m = if line_m.is_finite() { line_m } else { enters_m };
+    let station_m = line_m - BEFORE_LINE_M - request.behind_first_m - size.length_m / 2.0;
+    if station_m < size.length_m / 2.0 {
+        return Err("the crossing road is too short".into());
+    }
+    Ok(commanded(asked, way, Some(conflict.lane), station_m, Vec::new()))
+}
+
+/// The lanes that lead to a conflict, itself the last, at least so long before it.
+fn lanes_to(around: &Around, conflict: &Conflict, needed_m: f64) -> Vec<LaneIndex> {
     let map = &around.scene.map;
-    let needed_m = request.speed_mps * arrival_s + request.behind_first_m + size.length_m;
     let mut lanes = vec![conflict.lane];
     let mut upstream_m = conflict.lane_station_m;
     let on_route = |lane: LaneIndex| around.scene.route.lanes.iter().any(|part| part.lane == lane);
@@ -77,6 +107,15 @@ fn rendezvous(asked: &Asked, conflict: &Conflict, arrival_s: f64) -> Result<Driv
         upstream_m += map.lane(previous).centre.length_m();
         lanes.insert(0, previous);
     }
+    lanes
+}
+
+/// A driver that reaches a conflict after `arrival_s`, when the ego vehicle does, if nothing is in its way.
+fn rendezvous(asked: &Asked, conflict: &Conflict, arrival_s: f64) -> Result<Driver, String> {
+    let Asked { around, request, size, id, .. } = *asked;
+    let map = &around.scene.map;
+    let needed_m = request.speed_mps * arrival_s + request.behind_first_m + size.length_m;
+    let lanes = lanes_to(around, conflict, needed_m);
     let mut rng = choices(around.seed, id, 0);
     let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
     let meeting_m = way.lane_begin_m(conflict.lane).expect("the way was made through this lane")
@@ -127,7 +166,9 @@ fn approach_m(asked: &Asked, way: &Way, meeting_m: f64, arrival_s: f64) -> Resul
     let signs_m: &[f64] = if minds_signals { &way.stop_signs_m } else { &[] };
     let lines: &[StopLine] = if minds_signals { &way.stop_lines } else { &[] };
     while left_s > 1e-9 {
-        let speed_mps = request.speed_mps.min(way.speed_mps_max(front_m)).max(0.1);
+        // A driver looks from the middle of its vehicle. Who is to be there at no certain time was placed by its front before.
+        let from_m = if request.early_s.is_some() { front_m - size.length_m / 2.0 } else { front_m };
+        let speed_mps = request.speed_mps.min(way.speed_mps_max(from_m)).max(0.1);
         let step_m = TIMING_M.min(speed_mps * left_s);
         front_m -= step_m;
         left_s -= step_m / speed_mps;

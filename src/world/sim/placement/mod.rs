@@ -211,7 +211,13 @@ fn finish(asked: &Asked, motion: Motion, moved: Moved) -> Result<RoadUser, Strin
     let SpawnRequest { body, colour, verb, .. } = *request;
     let newcomer = RoadUser::new(around, id, body, colour, verb, Mover::new(size, motion), moved);
     let room_m = if verb == Verb::Follow { GUIDED_ROOM_M } else { ROOM_M };
-    if newcomer.has_room(around, room_m) { Ok(newcomer) } else { Err("another road user is there".into()) }
+    match newcomer.who_is_there(around, room_m) {
+        None => Ok(newcomer),
+        Some(other) if core::ptr::eq(other.outline, around.ego().outline) => {
+            Err("the ego vehicle is there".into())
+        }
+        Some(_) => Err("another road user is there".into()),
+    }
 }
 
 /// Refuses a newcomer that could not brake for a road user ahead of it. The ego vehicle does not count:

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use avastra_base::geometry::Path;
-use avastra_lang::model::{Laid, Trajectory};
 use avastra_lang::model::command::{Command, IgnoredRules, Told};
 use avastra_lang::model::vocabulary::{LaneChoice, TrafficRule, Turning, Verb};
+use avastra_lang::model::{Laid, Trajectory};
 
 use crate::action::{Effect, OnTrajectory, OrderRequest, SpawnRequest, Surroundings};
 use crate::sim::scene::Scene;
@@ -233,7 +233,10 @@ fn who_follows_a_trajectory_is_at_a_place_of_it_when_the_ego_vehicle_is_at_one_o
     let scene = Arc::new(scene);
     for (speed_mps, reach_m, steady_m) in [(2.0, 6.0, 3.0), (8.0, 9.0, 1.0), (1.0, 4.0, 0.0)] {
         let mut world = World::new(Arc::clone(&scene), &Start { ego_mps: 10.0, ..testing::start() });
-        let asked = SpawnRequest { trajectory: Some(OnTrajectory { index: 0, begins_m: None }), ..request(Verb::Follow, 0.0, 0.0) };
+        let asked = SpawnRequest {
+            trajectory: Some(OnTrajectory { index: 0, begins_m: None }),
+            ..request(Verb::Follow, 0.0, 0.0)
+        };
         let user = spawn(&mut world, named(asked)).id;
         let at_m = 110.0;
         let early_s = Some(0.0);

@@ -2,16 +2,19 @@
 
 use std::sync::Arc;
 
-use crate::action::{Draw, Effect, LaterMoment, OrderRequest, SpawnRequest};
+use crate::action::{Draw, Effect, LaterMoment, LightRequest, OrderRequest, SpawnRequest};
+use crate::sim::ego::VehicleParameters;
 use crate::sim::moment::npc_facts;
 use crate::sim::npc::View;
 use crate::sim::placement;
 use crate::sim::placement::Arrivals;
 use crate::sim::road_user::{Advance, Motion, PhaseCount, RoadUser, Running};
+use crate::sim::sense::SignalColour;
 use avastra_lang::model::command::Command;
 use avastra_lang::model::{COMMANDED_MAX, NpcFacts};
+use avastra_road::StopLine;
 
-use super::{DT_S, World};
+use super::{DT_S, Switch, World};
 
 /// Commanded obstacles at a time. For the next one, the oldest that is out of sight leaves; in the published package the
 /// oldest leaves wherever it is.
@@ -48,7 +51,7 @@ impl World {
             let course = draw.course(nth);
             let may_change = match effect {
                 Effect::Order(order) => order.command.lane.is_some() || course.is_some(),
-                Effect::Time(_) | Effect::Sky(..) | Effect::Spawn(_) => true,
+                Effect::Time(_) | Effect::Sky(..) | Effect::Spawn(_) | Effect::Light(_) => true,
             };
             if let Some(course) = course {
                 let running = Running::new(Arc::clone(course), self.ticks);
@@ -75,6 +78,7 @@ impl World {
             Effect::Sky(phenomenon, level) => self.environment.set(*phenomenon, *level),
             Effect::Spawn(request) => return self.spawn(request).map(Some),
             Effect::Order(order) => return self.order(order).map(|()| None),
+            Effect::Light(light) => return self.order_light(light).map(|()| None),
         }
         self.weather_tick = self.ticks + (self.traffic.weather_rest_s / DT_S).round() as u64;
         self.conditions = self.environment.conditions(self.ego.motion.speed_mps);
@@ -147,6 +151,42 @@ impl World {
         Ok(())
     }
 
+    /// The ego vehicle's next traffic light and the station of its line, if an order can be about it.
+    ///
+    /// # Errors
+    /// Why it cannot, in words that complete "cannot order `light`: …".
+    pub(super) fn light_ordered(&self, light: &LightRequest) -> Result<StopLine, String> {
+        let front_m = VehicleParameters::MKZ.front_m(self.ego_station_m);
+        let ahead = |line: &&StopLine| line.station_m >= self.ego_station_m;
+        let line = self.scene.route.stop_lines.iter().find(ahead).ok_or("no traffic light is ahead")?;
+        match light.at_m {
+            Some(at_m) if line.station_m - front_m < at_m => Err("the ego vehicle is nearer already".into()),
+            Some(_) | None => Ok(*line),
+        }
+    }
+
+    fn order_light(&mut self, light: &LightRequest) -> Result<(), String> {
+        let StopLine { signal, station_m, .. } = self.light_ordered(light)?;
+        // Infinitely far before its line it is at once.
+        let at_m = station_m - light.at_m.unwrap_or(f64::INFINITY);
+        self.switch = Some(Switch { signal, colour: light.colour, at_m });
+        self.switch_light();
+        Ok(())
+    }
+
+    /// Lets a light show what it was told to, once the ego vehicle's front is there. Until then it goes on as it does, but a
+    /// green one waits with its change.
+    pub(super) fn switch_light(&mut self) {
+        let Some(Switch { signal, colour, at_m }) = self.switch else { return };
+        let (map, tick) = (&self.scene.map, self.ticks);
+        if VehicleParameters::MKZ.front_m(self.ego_station_m) >= at_m {
+            self.signals.jump(map, signal, tick, colour);
+            self.switch = None;
+        } else if self.signals.colour(map, signal, tick) == SignalColour::Green {
+            self.signals.stay(map, signal, tick + 1);
+        }
+    }
+
     /// Moves on the manoeuvres of road users, whose phases tell them what to do.
     pub(super) fn direct(&mut self) {
         let has_course = |user: &RoadUser| user.mover.course.is_some();
@@ -188,7 +228,8 @@ impl World {
             };
             mover.course = rest;
             let Some(command) = command else { continue };
-            let to = command.to.map(|who| self.bearer_id(who).filter(|id| *id != self.users[index].obstacle.id));
+            let to =
+                command.to.map(|who| self.bearer_id(who).filter(|id| *id != self.users[index].obstacle.id));
             let mover = &mut self.users[index].mover;
             match to {
                 // Without somebody to whom the gap would be kept that has no value.

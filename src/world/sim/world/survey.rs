@@ -2,7 +2,7 @@
 
 use std::cell::OnceCell;
 
-use crate::action::{OrderRequest, SpawnFacts, SpawnRequest, Surroundings};
+use crate::action::{LightRequest, OrderRequest, SpawnFacts, SpawnRequest, Surroundings};
 use crate::sim::placement;
 use crate::sim::placement::Arrivals;
 use avastra_lang::model::{MomentFacts, NpcFacts};
@@ -43,6 +43,10 @@ impl Surroundings for World {
         self.ordered(order).err()
     }
 
+    fn light_refusal(&self, light: &LightRequest) -> Option<String> {
+        self.light_ordered(light).err().map(|reason| format!("cannot order `light`: {reason}"))
+    }
+
     fn weather_refusal(&self) -> Option<String> {
         let left_s = self.weather_tick.saturating_sub(self.ticks) as f64 * DT_S;
         (left_s > 0.0).then(|| format!("this traffic profile keeps the weather for {left_s} s more"))
@@ -67,6 +71,10 @@ impl Surroundings for Survey<'_> {
 
     fn order_refusal(&self, order: &OrderRequest) -> Option<String> {
         self.world.order_refusal(order)
+    }
+
+    fn light_refusal(&self, light: &LightRequest) -> Option<String> {
+        self.world.light_refusal(light)
     }
 
     fn weather_refusal(&self) -> Option<String> {

@@ -144,7 +144,7 @@ fn laid(setup: &Setup, row: &Row, map_file: &str) -> Result<RowFile, String> {
         }
         newcomers.push(Newcomer { name, actor, request, course: draw.course(nth), facts });
     }
-    if draw.effects.iter().any(|effect| matches!(effect, Effect::Order(_))) {
+    if draw.effects.iter().any(|effect| matches!(effect, Effect::Order(_) | Effect::Light(_))) {
         return Err("it gives orders".to_owned());
     }
     let duration_s = space.episode.step_s * f64::from(space.episode.step_limit);
