@@ -12,10 +12,12 @@ use avastra_campaign::episode::{EpisodeLog, Outcome};
 use avastra_lang::model::body::parameters;
 use avastra_lang::model::command::{Command, IgnoredRules};
 use avastra_lang::model::vocabulary::{Body, Phenomenon, TrajectoryField, Verb, Word};
-use avastra_lang::model::{BodyDef, Memory, Road, SPAWN_SPEED_MPS, Scenario, Space, TrajectoryDef, ticks_s};
+use avastra_lang::model::{
+    BodyDef, LightProgram, Memory, Road, SPAWN_SPEED_MPS, Scenario, Space, TrajectoryDef, ticks_s,
+};
 use avastra_lang::syntax::ast::{ExprKind, Field, ItemKind};
 use avastra_lang::syntax::print_item;
-use avastra_world::action::{Effect, LightRequest, OrderRequest, SpawnRequest};
+use avastra_world::action::{Begins, Effect, LightRequest, OrderRequest, SpawnRequest};
 use avastra_world::sim::VehicleParameters;
 
 /// The scenario in an exported file.
@@ -157,10 +159,11 @@ impl<'a> Actions<'a> {
         let place = match request.trajectory.map(|on| (on, &space.trajectories[on.index])) {
             Some((on, trajectory)) => {
                 self.trajectories.insert(on.index, trajectory);
-                let (place, place_m) = match on.begins_m {
+                let (place, place_m) = match on.begins {
                     None => ("at", distance_m),
-                    Some(begins_m) if begins_m >= 0.0 => ("ahead", begins_m),
-                    Some(begins_m) => ("behind", -begins_m - VehicleParameters::MKZ.length_m),
+                    Some(Begins::BehindRear(way_m)) => ("behind", way_m),
+                    Some(Begins::BeforeFront(way_m)) if way_m >= 0.0 => ("ahead", way_m),
+                    Some(Begins::BeforeFront(way_m)) => ("behind", -way_m - VehicleParameters::MKZ.length_m),
                 };
                 // No distance says it.
                 self.is_moved |= place_m < 0.0;
@@ -250,6 +253,10 @@ fn road_text(road: &Road, name: &str) -> Option<String> {
     }
     if let Some(phase_s) = road.signal_phase_s {
         let _ = write!(text, ", signal_phase: {} s", decimal(phase_s, false));
+    }
+    let LightProgram { green_s, yellow_s, all_red_s } = road.lights;
+    for (name, time_s) in [("green", green_s), ("yellow", yellow_s), ("all_red", all_red_s)] {
+        time_s.iter().for_each(|time_s| text += &format!(", {name}: {} s", decimal(*time_s, false)));
     }
     let mut passed = road.route.lanes.iter().filter_map(|part| road.map.lane(part.lane).junction);
     if passed.any(|junction| road.map.junctions[junction].idle_lights > 0) {

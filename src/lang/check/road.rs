@@ -10,7 +10,8 @@ use crate::check::names::unknown;
 use crate::check::report::{Report, all_of, field};
 use crate::model::vocabulary::{RoadField, Word};
 use crate::model::{
-    Road, RoadFacts, SIGNAL_PHASE_S, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, Type, code, stretches,
+    LightProgram, Road, RoadFacts, SIGNAL_PHASE_S, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, Type, code,
+    stretches,
 };
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, print_expr};
@@ -28,6 +29,10 @@ pub(crate) trait Maps {
     /// The route between two places of a map.
     fn route(&mut self, map: &Arc<RoadMap>, start: LanePlace, goal: LanePlace) -> Result<Route, RoadError>;
 }
+
+/// How long a light may show a colour, s; red for all may be left out.
+const LIGHT_S_MIN: f64 = 0.5;
+const LIGHT_S_MAX: f64 = 600.0;
 
 impl Checker {
     /// The roads of `episode.roads`, or all.
@@ -128,6 +133,19 @@ impl Checker {
             }
             None => None,
         };
+        let mut light_time = |wanted: RoadField, least_s: f64| match field(&fields, wanted) {
+            Some(value) => {
+                let what = format!("a time of {}", wanted.name().replace('_', " "));
+                let example = format!("{}: 3 s", wanted.name());
+                self.road_number(value, Dimension::DURATION, &what, least_s..=LIGHT_S_MAX, &example).map(Some)
+            }
+            None => Some(None),
+        };
+        let lights = LightProgram {
+            green_s: light_time(RoadField::Green, LIGHT_S_MIN)?,
+            yellow_s: light_time(RoadField::Yellow, LIGHT_S_MIN)?,
+            all_red_s: light_time(RoadField::AllRed, 0.0)?,
+        };
         let facts = facts(&block.name.text, &map, &route);
         let name = block.name.text.clone();
         Some(Road {
@@ -141,6 +159,7 @@ impl Checker {
             ego_mps: ego_mps?,
             set_mps,
             signal_phase_s,
+            lights,
             trajectories: Vec::new(),
             facts,
         })

@@ -625,9 +625,18 @@ pub struct Road {
     pub set_mps: Option<f64>,
     /// When in the signals' cycle an episode begins, s; `None`: by chance.
     pub signal_phase_s: Option<f64>,
+    pub lights: LightProgram,
     /// Where each trajectory of the space lies; `None` for one on another map.
     pub trajectories: Vec<Option<Laid>>,
     pub facts: RoadFacts,
+}
+
+/// How long the lights of a road show what, s; `None`: as the engine's.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct LightProgram {
+    pub green_s: Option<f64>,
+    pub yellow_s: Option<f64>,
+    pub all_red_s: Option<f64>,
 }
 
 /// What rules may ask about a road.

@@ -445,6 +445,9 @@ words! {
     EgoSpeed "ego_speed" = "How fast the ego vehicle is as an episode begins: `ego_speed: 60 km/h`.",
     SetSpeed "set_speed" = "How fast the ego vehicle wants to drive where it is free to: `set_speed: 130 km/h`.",
     SignalPhase "signal_phase" = "When in their cycle the lights are as an episode begins: `signal_phase: 12 s`; by chance without it.",
+    Green "green" = "How long each group of lights is green: `green: 20 s`; 12 s without it, less where many groups follow each other.",
+    Yellow "yellow" = "How long a light is yellow: `yellow: 4 s`; 3 s without it.",
+    AllRed "all_red" = "How long all are red before the next group is green: `all_red: 1 s`; 2 s without it.",
     Unlit "unlit" = "Whether to drive through junctions whose lights hold no lane, as if they had none: `unlit: true`.",
 }
 

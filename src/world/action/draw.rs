@@ -7,9 +7,8 @@ use crate::action::course::Part;
 use crate::action::later::Later;
 use crate::action::table::{Draw, Refusal, Situation};
 use crate::action::{
-    Course, Effect, LaneChangeRules, LightRequest, OnTrajectory, OrderRequest, SpawnRequest,
+    Begins, Course, Effect, LaneChangeRules, LightRequest, OnTrajectory, OrderRequest, SpawnRequest,
 };
-use crate::sim::VehicleParameters;
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::body::{OwnBody, parameters};
@@ -341,20 +340,21 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// How far before the ego vehicle's front a way beside its route begins, m: NaN if it begins beside somebody who is not there.
-    fn begins_m(&self, spawn: &SpawnDef, distance_m: f64, locals: &[Value]) -> f64 {
-        let ego_front_m = self.moment.ego_front_m;
-        let (front_m, rear_m) = match spawn.of {
-            // The moment may not have been asked for.
-            None => (0.0, -VehicleParameters::MKZ.length_m),
-            Some(of) => {
-                let who = of.bearer(locals);
-                let known = self.bearers.iter().find(|(known, _)| *known == who);
-                let known = known.map(|(_, npc)| (npc.front_m - ego_front_m, npc.rear_m - ego_front_m));
-                known.unwrap_or((f64::NAN, f64::NAN))
-            }
+    /// Where a way beside the ego vehicle's route begins: at NaN m beside somebody who is not there.
+    fn begins(&self, spawn: &SpawnDef, distance_m: f64, locals: &[Value]) -> Begins {
+        let Some(of) = spawn.of else {
+            return match spawn.behind {
+                true => Begins::BehindRear(distance_m),
+                false => Begins::BeforeFront(distance_m),
+            };
         };
-        if spawn.behind { rear_m - distance_m } else { front_m + distance_m }
+        let who = of.bearer(locals);
+        let known = self.bearers.iter().find(|(known, _)| *known == who);
+        let place_m = |npc: &NpcFacts| match spawn.behind {
+            true => npc.rear_m - distance_m,
+            false => npc.front_m + distance_m,
+        };
+        Begins::BeforeFront(known.map_or(f64::NAN, |(_, npc)| place_m(npc)) - self.moment.ego_front_m)
     }
 
     fn request(&self, spawn: &SpawnDef, locals: &[Value], after: &Memory) -> SpawnRequest {
@@ -377,8 +377,8 @@ impl<'a> Judge<'a> {
         };
         let trajectory = spawn.trajectory.as_ref().map(|one| one.word(functions, &facts));
         let is_beside_route = |index: usize| self.row.space.trajectories[index].is_beside_route();
-        let begins_m =
-            trajectory.filter(|index| is_beside_route(*index)).map(|_| self.begins_m(spawn, asked_m, locals));
+        let begins = trajectory.filter(|index| is_beside_route(*index));
+        let begins = begins.map(|_| self.begins(spawn, asked_m, locals));
         SpawnRequest {
             body: body.like,
             own: own(body),
@@ -390,7 +390,7 @@ impl<'a> Judge<'a> {
             then: spawn.then.word(functions, &facts),
             speed_mps: rounded_into(evaluate(&spawn.speed, functions, &facts).number(), SPAWN_SPEED_MPS),
             distance_m: match spawn.of {
-                _ if begins_m.is_some() => 0.0,
+                _ if begins.is_some() => 0.0,
                 None => rounded_into(asked_m, spawn_distance_m(verb)),
                 Some(of) => self.beside_m(of, spawn, asked_m, shape.length_m, verb, locals),
             },
@@ -414,7 +414,7 @@ impl<'a> Judge<'a> {
                 .map(|waits| rounded_into(evaluate(waits, functions, &facts).number(), WAITS_S)),
             siren: spawn.siren.as_ref().is_some_and(|siren| evaluate(siren, functions, &facts).truth()),
             turn: spawn.turn.as_ref().map(|turn| turn.word(functions, &facts)),
-            trajectory: trajectory.map(|index| OnTrajectory { index, begins_m }),
+            trajectory: trajectory.map(|index| OnTrajectory { index, begins }),
             behind_first_m,
             bearer: spawn.bearer,
         }

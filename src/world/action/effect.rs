@@ -98,9 +98,17 @@ pub struct SpawnRequest {
 pub struct OnTrajectory {
     /// In the space.
     pub index: usize,
-    /// Of one that lies beside the ego vehicle's route: how far before the ego vehicle's front it begins there, m; below 0
-    /// behind that. Its station is then 0.
-    pub begins_m: Option<f64>,
+    /// Where one begins that lies beside the ego vehicle's route. The station is then 0.
+    pub begins: Option<Begins>,
+}
+
+/// Where a way beside the ego vehicle's route begins, along that.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Begins {
+    /// So far before its front, m; below 0 behind that.
+    BeforeFront(f64),
+    /// So far behind its rear, m.
+    BehindRear(f64),
 }
 
 impl SpawnRequest {

@@ -30,7 +30,7 @@ pub use avastra_lang::model::SpawnFacts;
 pub use count::Count;
 pub use course::Course;
 pub use effect::{
-    Effect, LaneChangeRules, LightRequest, OnTrajectory, OrderRequest, SpawnRequest, Surroundings,
+    Begins, Effect, LaneChangeRules, LightRequest, OnTrajectory, OrderRequest, SpawnRequest, Surroundings,
 };
 pub use file::{AxisRecord, DrawRecord, RoadRecord, RowRecord, RuleRecord, TableFile};
 pub use later::LaterMoment;

@@ -3,9 +3,10 @@
 //! A group is green for 12 s and yellow for 3 s, then all are red for 2 s and the next group follows
 //! (yellow 3 to 4 s and all-red 1 to 2 s are usual in towns; the green is ours). Where so many groups
 //! follow each other that the cycle would last longer than two minutes, the greens are shorter, down to
-//! 5 s. Counted in ticks, so that the colour of any moment is exact. No vehicle detection, no pedestrian
+//! 5 s. A road may say other times. Counted in ticks, so that the colour of any moment is exact. No vehicle detection, no pedestrian
 //! lights.
 
+use avastra_lang::model::LightProgram;
 use avastra_lang::model::vocabulary::LightColour;
 use avastra_road::RoadMap;
 
@@ -21,13 +22,29 @@ const ALL_RED_S: f64 = 2.0;
 const CYCLE_S_MAX: f64 = 120.0;
 const GREEN_S_MIN: f64 = 5.0;
 
-const GREEN_TICKS: u64 = ticks(GREEN_S);
-const YELLOW_TICKS: u64 = ticks(YELLOW_S);
-const CHANGE_TICKS: u64 = ticks(YELLOW_S) + ticks(ALL_RED_S);
+/// How long what is shown, in ticks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Program {
+    /// Without it as long as so many groups allow.
+    green: Option<u64>,
+    yellow: u64,
+    all_red: u64,
+}
 
-/// How long each of some groups is green.
-fn green_ticks(groups: u64) -> u64 {
-    (ticks(CYCLE_S_MAX) / groups).saturating_sub(CHANGE_TICKS).clamp(ticks(GREEN_S_MIN), GREEN_TICKS)
+impl Program {
+    fn of(lights: LightProgram) -> Program {
+        Program {
+            green: lights.green_s.map(ticks),
+            yellow: ticks(lights.yellow_s.unwrap_or(YELLOW_S)),
+            all_red: ticks(lights.all_red_s.unwrap_or(ALL_RED_S)),
+        }
+    }
+
+    /// How long each of some groups is green.
+    fn green(&self, groups: u64) -> u64 {
+        let left = (ticks(CYCLE_S_MAX) / groups).saturating_sub(self.yellow + self.all_red);
+        self.green.unwrap_or_else(|| left.clamp(ticks(GREEN_S_MIN), ticks(GREEN_S)))
+    }
 }
 
 /// Time after which every cycle of up to seven groups begins anew, s: 720 720 is divisible by 1, 2, … 7. (Beyond
@@ -37,38 +54,40 @@ const REPEAT_S: f64 = 720_720.0 * (GREEN_S + YELLOW_S + ALL_RED_S);
 /// Where in its cycle every signal stands at tick 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SignalClock {
-    offset_ticks: u64,
+    offset_ticks: i64,
+    program: Program,
 }
 
 /// The cycle of a signal: first it is green, then yellow, then red.
 struct Cycle {
     /// How far it is, in ticks.
     at: u64,
-    /// How long it is green, in ticks.
+    /// How long it is green, until when it is yellow, and how long all of it is, in ticks.
     green: u64,
+    yellow_ends: u64,
     all: u64,
 }
 
 impl SignalClock {
     /// A clock that is `phase_s` into the cycle; a phase that is negative or not finite counts as 0.
-    pub fn new(phase_s: f64) -> SignalClock {
-        SignalClock { offset_ticks: (phase_s.max(0.0) % REPEAT_S / DT_S + 0.5) as u64 }
+    pub fn new(phase_s: f64, lights: LightProgram) -> SignalClock {
+        let offset_ticks = (phase_s.max(0.0) % REPEAT_S / DT_S + 0.5) as i64;
+        SignalClock { offset_ticks, program: Program::of(lights) }
     }
 
     /// Colour of a signal (an index in `RoadMap::signals`) at a tick.
     pub fn colour(&self, map: &RoadMap, signal: usize, tick: u64) -> SignalColour {
-        let Cycle { at, green, .. } = self.cycle(map, signal, tick);
+        let Cycle { at, green, yellow_ends, .. } = self.cycle(map, signal, tick);
         match at {
             at if at < green => SignalColour::Green,
-            at if at < green + YELLOW_TICKS => SignalColour::Yellow,
+            at if at < yellow_ends => SignalColour::Yellow,
             _ => SignalColour::Red,
         }
     }
 
     /// For how many ticks a signal has had its colour at a tick, and after how many it has another one.
     pub fn around(&self, map: &RoadMap, signal: usize, tick: u64) -> (u64, u64) {
-        let Cycle { at, green, all } = self.cycle(map, signal, tick);
-        let yellow_ends = green + YELLOW_TICKS;
+        let Cycle { at, green, yellow_ends, all } = self.cycle(map, signal, tick);
         match at {
             at if at < green => (at, green - at),
             at if at < yellow_ends => (at - green, yellow_ends - at),
@@ -78,19 +97,19 @@ impl SignalClock {
 
     /// From a tick on the signal shows a colour, as if that had begun then. The cycles of all others jump with it.
     pub fn jump(&mut self, map: &RoadMap, signal: usize, tick: u64, colour: LightColour) {
-        let Cycle { at, green, all } = self.cycle(map, signal, tick);
+        let Cycle { at, green, yellow_ends, all } = self.cycle(map, signal, tick);
         let to = match colour {
             LightColour::Green => 0,
             LightColour::Yellow => green,
-            LightColour::Red => green + YELLOW_TICKS,
+            LightColour::Red => yellow_ends,
         };
-        self.offset_ticks = (self.offset_ticks + (to + all - at) % all) % ticks(REPEAT_S);
+        self.offset_ticks += ((to + all - at) % all) as i64;
     }
 
     /// A signal that would have another colour at a tick keeps the one before that for a tick more, and all others with it.
     pub fn stay(&mut self, map: &RoadMap, signal: usize, tick: u64) {
         if self.around(map, signal, tick).0 == 0 {
-            self.offset_ticks = self.offset_ticks.checked_sub(1).unwrap_or(ticks(REPEAT_S) - 1);
+            self.offset_ticks -= 1;
         }
     }
 
@@ -99,15 +118,17 @@ impl SignalClock {
         // A light on its own (at a zebra crossing) alternates with an unseen group.
         let groups = signal.junction.map_or(2, |junction| map.junctions[junction].groups);
         let groups = (groups.max(signal.group + 1)) as u64;
-        let green = green_ticks(groups);
-        let slot = green + CHANGE_TICKS;
+        let Program { yellow, all_red, .. } = self.program;
+        let green = self.program.green(groups);
+        let slot = green + yellow + all_red;
         let all = groups * slot;
-        let now = (tick + self.offset_ticks) % all;
-        Cycle { at: (now + all - signal.group as u64 * slot) % all, green, all }
+        let now = (tick as i64 + self.offset_ticks).rem_euclid(all as i64) as u64;
+        let at = (now + all - signal.group as u64 * slot) % all;
+        Cycle { at, green, yellow_ends: green + yellow, all }
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        trace.word(self.offset_ticks);
+        trace.word(self.offset_ticks as u64);
     }
 }
 
@@ -117,20 +138,29 @@ mod tests {
     use crate::sim::testing;
     use avastra_lang::model::vocabulary::Word;
 
+    fn program() -> Program {
+        Program::of(LightProgram::default())
+    }
+
+    fn clock(phase_s: f64) -> SignalClock {
+        SignalClock::new(phase_s, LightProgram::default())
+    }
+
     #[test]
     fn a_cycle_is_bounded() {
-        let cycle_s = |groups: u64| (groups * (green_ticks(groups) + CHANGE_TICKS)) as f64 * DT_S;
+        let Program { yellow, all_red, .. } = program();
+        let cycle_s = |groups: u64| (groups * (program().green(groups) + yellow + all_red)) as f64 * DT_S;
         let cycles_s = [1, 2, 7, 8, 12].map(cycle_s);
         for (cycle_s, expected_s) in cycles_s.iter().zip([17.0, 34.0, 119.0, 120.0, 120.0]) {
             assert!((cycle_s - expected_s).abs() < 0.2, "{cycles_s:?}");
         }
-        assert_eq!(green_ticks(20), ticks(GREEN_S_MIN));
+        assert_eq!(program().green(20), ticks(GREEN_S_MIN));
     }
 
     #[test]
     fn what_is_said_of_a_colour_s_time_is_so() {
         let map = testing::crossing().map.clone();
-        let mut clock = SignalClock::new(0.0);
+        let mut clock = clock(0.0);
         for tick in (0..4000).step_by(7) {
             let (since, left) = clock.around(&map, 0, tick + 4000);
             let colour = |tick| clock.colour(&map, 0, tick + 4000);
@@ -153,7 +183,7 @@ mod tests {
     #[test]
     fn one_group_at_a_time() {
         let map = testing::crossing().map.clone();
-        let clock = SignalClock::new(0.0);
+        let clock = clock(0.0);
         let colours =
             |time_s: f64| [clock.colour(&map, 0, ticks(time_s)), clock.colour(&map, 1, ticks(time_s))];
         use SignalColour::{Green, Red, Yellow};
@@ -169,14 +199,14 @@ mod tests {
         ] {
             assert_eq!(colours(time_s), expected, "at {time_s} s");
         }
-        assert_eq!(SignalClock::new(17.0).colour(&map, 1, 0), Green);
-        assert_eq!(SignalClock::new(f64::MAX).offset_ticks, (f64::MAX % REPEAT_S / DT_S + 0.5) as u64);
+        assert_eq!(self::clock(17.0).colour(&map, 1, 0), Green);
+        assert_eq!(self::clock(f64::MAX).offset_ticks, (f64::MAX % REPEAT_S / DT_S + 0.5) as i64);
         for odd_s in [-1.0, f64::NAN, f64::INFINITY] {
-            assert_eq!(SignalClock::new(odd_s), SignalClock::new(0.0));
+            assert_eq!(self::clock(odd_s), self::clock(0.0));
         }
         assert_eq!(
-            SignalClock::new(1e300).colour(&map, 1, 1000),
-            SignalClock::new(1e300 % REPEAT_S).colour(&map, 1, 1000)
+            self::clock(1e300).colour(&map, 1, 1000),
+            self::clock(1e300 % REPEAT_S).colour(&map, 1, 1000)
         );
     }
 }

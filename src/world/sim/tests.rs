@@ -87,13 +87,18 @@ fn impossible_spawns_are_refused() {
         let refusal = world.survey(&SpawnRequest { speed_mps, ..ahead }).expect_err("no such speed");
         assert_eq!(refusal, format!("the spawn's speed is {speed_mps} m/s, possible is 0 .. 70 m/s"));
     }
-    for distance_m in [f64::NAN, f64::INFINITY, -0.1, 1000.1, 1e300] {
+    for distance_m in [f64::NAN, f64::INFINITY, -30.1, 1000.1, 1e300] {
         let refusal = world.survey(&SpawnRequest { distance_m, ..ahead }).expect_err("no such distance");
-        assert_eq!(refusal, format!("the spawn's distance is {distance_m} m, possible is 0 .. 1000 m"));
+        assert_eq!(refusal, format!("the spawn's distance is {distance_m} m, possible is -30 .. 1000 m"));
     }
+    let behind = SpawnRequest { verb: Verb::DriveOpposite, distance_m: -0.1, ..ahead };
+    let refusal = world.survey(&behind).expect_err("no such distance");
+    assert_eq!(refusal, "the spawn's distance is -0.1 m, possible is 0 .. 1000 m");
+    let inside = SpawnRequest { distance_m: -2.0, ..ahead };
+    assert_eq!(world.survey(&inside).expect_err("no room"), "the ego vehicle is there");
     // Everybody may follow a trajectory, and this road has none.
     let follows = SpawnRequest { verb: Verb::Follow, ..ahead };
-    assert_eq!(world.survey(&follows).expect_err("no such way"), "its trajectory lies on another map");
+    assert_eq!(world.survey(&follows).expect_err("no such way"), "it follows no trajectory");
     for verb in Verb::ALL.iter().filter(|verb| **verb != Verb::Follow) {
         let on_foot = verb.is_on_foot();
         let body = if on_foot { Body::SUV } else { Body::Pedestrian };

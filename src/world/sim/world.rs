@@ -181,7 +181,7 @@ impl World {
             ego_passed: None,
             conditions: environment.conditions(speed_mps),
             environment,
-            signals: SignalClock::new(start.signal_phase_s),
+            signals: SignalClock::new(start.signal_phase_s, scene.lights),
             switch: None,
             users: Vec::with_capacity(COMMANDED_MAX as usize),
             next_id: 1,

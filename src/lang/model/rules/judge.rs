@@ -303,8 +303,15 @@ impl<'a> RowRules<'a> {
                 .map(|who| who.bearer(candidate.values))
                 .find(|who| !is_there(who));
             let why = match absent {
-                Some(who) if self.space.actions[self.row.action].spawns().any(|spawn| spawn.bearer == Some(who)) => {
-                    format!("no earlier `{}` is there (the one that appears is `npc`)", self.space.bearers[who])
+                Some(who)
+                    if self.space.actions[self.row.action]
+                        .spawns()
+                        .any(|spawn| spawn.bearer == Some(who)) =>
+                {
+                    format!(
+                        "no earlier `{}` is there (the one that appears is `npc`)",
+                        self.space.bearers[who]
+                    )
                 }
                 Some(who) => format!("`{}` is not there", self.space.bearers[who]),
                 None => "a division by 0 has no value".to_owned(),

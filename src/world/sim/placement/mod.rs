@@ -12,7 +12,7 @@ mod on_foot;
 
 use std::sync::Arc;
 
-use crate::action::{SpawnFacts, SpawnRequest};
+use crate::action::{Begins, SpawnFacts, SpawnRequest};
 use avastra_base::kinematics::braking_m;
 use avastra_lang::model::Laid;
 use avastra_lang::model::vocabulary::Verb;
@@ -100,9 +100,13 @@ fn on_trajectory(asked: &Asked) -> Result<Newcomers, String> {
     let way = match laid.ok_or("its trajectory lies on another map")? {
         Laid::OnMap(way) => Arc::clone(way),
         Laid::BesideRoute(way) => {
-            let begins_m = on.begins_m.filter(|begins_m| begins_m.is_finite());
-            let begins_m = begins_m.ok_or("nobody of that name is there")?;
-            let begins_m = VehicleParameters::MKZ.front_m(around.ego_station_m) + begins_m;
+            let begins_m = match on.begins.ok_or("it begins nowhere")? {
+                Begins::BeforeFront(way_m) => VehicleParameters::MKZ.front_m(around.ego_station_m) + way_m,
+                Begins::BehindRear(way_m) => VehicleParameters::MKZ.rear_m(around.ego_station_m) - way_m,
+            };
+            if !begins_m.is_finite() {
+                return Err("nobody of that name is there".into());
+            }
             let Route { path, .. } = &scene.route;
             if begins_m > path.length_m() {
                 return Err("the route ends before that distance".into());

@@ -234,7 +234,7 @@ fn who_follows_a_trajectory_is_at_a_place_of_it_when_the_ego_vehicle_is_at_one_o
     for (speed_mps, reach_m, steady_m) in [(2.0, 6.0, 3.0), (8.0, 9.0, 1.0), (1.0, 4.0, 0.0)] {
         let mut world = World::new(Arc::clone(&scene), &Start { ego_mps: 10.0, ..testing::start() });
         let asked = SpawnRequest {
-            trajectory: Some(OnTrajectory { index: 0, begins_m: None }),
+            trajectory: Some(OnTrajectory { index: 0, begins: None }),
             ..request(Verb::Follow, 0.0, 0.0)
         };
         let user = spawn(&mut world, named(asked)).id;
