@@ -35,7 +35,7 @@ use avastra::editor::{Files, Workspace, diagnostics};
 use avastra::mdp::ProcKind;
 use avastra::model::Space;
 use avastra::model::command::IgnoredRules;
-use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
+use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, ShownLights, Side, Then, TimeOfDay, Verb};
 use avastra::run::{Arena, Run, RunSettings};
 use avastra::sim::{Scene, Sensed, Start, TrafficProfile, World};
 use avastra::{ads, episode};
@@ -137,8 +137,11 @@ fn crowded(scene: &Arc<Scene>) -> World {
                     ignores: IgnoredRules::default(),
                     meet: None,
                     waits_s: None,
+                    early_s: None,
+                    behind_first_m: 0.0,
                     siren: false,
                     turn: None,
+                    lights: ShownLights::Off,
                     trajectory: None,
                     bearer: None,
                     own: None,
@@ -297,7 +300,7 @@ impl Attached {
             #[allow(clippy::disallowed_methods, reason = "a benchmark is about the clock")]
             let start = Instant::now();
             let setup = self.arena.setup(0, 1);
-            let log = episode::run(&setup, &mut |_| episode::Choice::Pass, &mut |_, _, _| {});
+            let log = episode::run(&setup, &mut |_| episode::Choice::Pass);
             assert!(log.failure.is_none(), "{:?}", log.failure);
             let questions = log.conversation.map_or(0, |conversation| conversation.exchanges.len());
             (questions as f64, start.elapsed().as_secs_f64())

@@ -268,6 +268,8 @@ class Object:
     width: float
     height: float
     visible: float
+    #: hazard, left, right or flash; None of one that shows nothing.
+    lights: Optional[str] = None
 
     @property
     def speed(self) -> float:

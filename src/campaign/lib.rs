@@ -23,12 +23,12 @@
 //!     let mut offers = arena.table().offers(moment.situation).into_iter().rev();
 //!     offers.find_map(Result::ok).map_or(Choice::Pass, Choice::Act)
 //! };
-//! let log = episode::run(&arena.setup(0, 1), &mut last_legal, &mut |_, _, _| {});
+//! let log = episode::run(&arena.setup(0, 1), &mut last_legal);
 //!
 //! // Its choices alone, as a script, play it again to the bit.
 //! let script = Script::of_log(&log);
 //! let mut as_written = |moment: &Moment| script.choose(arena.table(), moment);
-//! let again = episode::run(&arena.setup(0, 1), &mut as_written, &mut |_, _, _| {});
+//! let again = episode::run(&arena.setup(0, 1), &mut as_written);
 //! assert_eq!(again.trace(), log.trace());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use avastra_base::geometry::{OrientedBox, Pose, Vec2, distance_m, unit_vector, wrap_angle};
-use avastra_lang::model::vocabulary::Body;
+use avastra_lang::model::vocabulary::{Body, ShownLights};
 use avastra_road::testing::{lanes, road, street};
 use avastra_road::{RoadMap, Route, Signal, StopLine};
 use avastra_world::sim;
@@ -149,6 +149,7 @@ pub fn object(id: u32, body: Body, pose: Pose, speed_mps: f64) -> SensedObject {
         distance_m: 0.0,
         is_unlit: false,
         has_siren: false,
+        lights: ShownLights::Off,
     }
 }
 

@@ -334,7 +334,7 @@ impl<'a> Place<'a> {
         match CommandField::from_name(&field.name.text) {
             Some(CommandField::Then) => self.word_or_value(Kind::Manoeuvres, &field.value, None),
             Some(CommandField::To) => self.word_or_value(Kind::RoadUsers, &field.value, None),
-            Some(CommandField::Lane | CommandField::Ignores) => {
+            Some(CommandField::Lane | CommandField::Ignores | CommandField::Lights | CommandField::Turn) => {
                 self.word_or_value(Kind::Words(words::engine_words(&field.name.text)), &field.value, None)
             }
             _ => self.within(&field.value, None, None),

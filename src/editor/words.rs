@@ -3,8 +3,8 @@
 
 use avastra_lang::model::vocabulary::{
     BEGINS, Body, Colour, CommandField, EpisodeField, LaneChoice, LightColour, LightField, NearWord,
-    PastWord, ROAD_USER, RoadField, SINCE, Side, Site, SpawnField, StartField, TYPES, Then, TrafficRule,
-    Turning, Verb, Word,
+    PastWord, ROAD_USER, RoadField, SINCE, ShownLights, Side, Site, SpawnField, StartField, TYPES, Then,
+    TrafficRule, Turning, Verb, Word,
 };
 use avastra_lang::model::{ENDS, MODULES};
 
@@ -44,6 +44,7 @@ pub fn engine_words(field: &str) -> Vec<Entry> {
         Some(SpawnField::Colour) => of::<Colour>(),
         Some(SpawnField::Ignores) => of::<TrafficRule>(),
         Some(SpawnField::Turn) => of::<Turning>(),
+        Some(SpawnField::Lights) => of::<ShownLights>(),
         None if field == "body" => of::<Body>(),
         Some(
             SpawnField::Speed

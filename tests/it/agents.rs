@@ -90,19 +90,15 @@ fn a_branch_shows_what_then_comes_to_pass() {
     let run = run(1, 7, &[]);
     let setup = run.setup(0);
     let mut ahead = Vec::new();
-    let log = episode::run(
-        &setup,
-        &mut |moment| {
-            let offers = run.table().offers(moment.situation);
-            let mut draws = offers.into_iter().filter_map(Result::ok);
-            let Some(draw) = draws.nth(moment.step % 3) else { return Choice::Pass };
-            // Other rows are tried in a branch as well; they leave no trace in the episode.
-            draws.take(2).for_each(|other| drop(moment.look_ahead(other)));
-            ahead.push(moment.look_ahead(draw.clone()));
-            Choice::Act(draw)
-        },
-        &mut |_, _, _| {},
-    );
+    let log = episode::run(&setup, &mut |moment| {
+        let offers = run.table().offers(moment.situation);
+        let mut draws = offers.into_iter().filter_map(Result::ok);
+        let Some(draw) = draws.nth(moment.step % 3) else { return Choice::Pass };
+        // Other rows are tried in a branch as well; they leave no trace in the episode.
+        draws.take(2).for_each(|other| drop(moment.look_ahead(other)));
+        ahead.push(moment.look_ahead(draw.clone()));
+        Choice::Act(draw)
+    });
     assert!(ahead.len() > 3);
     for branch in ahead {
         assert_eq!(branch.steps, log.steps[..branch.steps.len()]);

@@ -1,6 +1,7 @@
 //! Cases: each file of a directory is rendered, and the result is compared with its snapshot.
 
 use std::collections::BTreeMap;
+use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
 
 /// The repository.
@@ -65,11 +66,22 @@ pub fn expect_snapshot(area: &str, stem: &str, text: &str) {
     settings.bind(|| insta::assert_snapshot!(stem, text));
 }
 
+/// Tries every case of an area, and names all that fail. With `AVASTRA_CASE` in the environment those whose names hold that.
+pub fn try_each(area: &str, try_one: impl Fn(&str, &Path)) {
+    let wanted = std::env::var("AVASTRA_CASE").unwrap_or_default();
+    let all = cases(area).into_iter().filter(|(stem, _)| stem.contains(&wanted));
+    let fails = |(stem, path): &(String, PathBuf)| {
+        std::panic::catch_unwind(AssertUnwindSafe(|| try_one(stem, path))).is_err()
+    };
+    let failed: Vec<String> = all.filter(fails).map(|(stem, _)| stem).collect();
+    assert!(failed.is_empty(), "{} cases of {area} failed: {}", failed.len(), failed.join(", "));
+}
+
 /// Renders every case of an area; input and output stand together in the snapshot.
 pub fn each_case(area: &str, render: impl Fn(&Path) -> String) {
-    for (stem, path) in cases(area) {
-        let source = std::fs::read(&path).expect("a case is readable");
+    try_each(area, |stem, path| {
+        let source = std::fs::read(path).expect("a case is readable");
         let source = String::from_utf8_lossy(&source);
-        expect_snapshot(area, &stem, &format!("{source}\n----\n{}", render(&path)));
-    }
+        expect_snapshot(area, stem, &format!("{source}\n----\n{}", render(path)));
+    });
 }

@@ -59,7 +59,7 @@ fn cli_alone_touches_files_and_the_environment() {
     for path in sources(&root().join("src")).into_iter().filter(outside) {
         let text = std::fs::read_to_string(&path).expect("a source file is readable");
         // Tests at the end of a file may read what the repository ships.
-        let text = text.split("#[cfg(test)]").next().unwrap_or(&text);
+        let text = without_tests(&text);
         // An example in a document stands for a program that uses the library.
         let text: String = text.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
         let is_test = path.components().any(|part| part.as_os_str().to_string_lossy().contains("test"));
@@ -106,7 +106,7 @@ fn files_alone_writes_and_removes() {
             continue;
         }
         let text = std::fs::read_to_string(&path).expect("a source file is readable");
-        let text = text.split("#[cfg(test)]").next().unwrap_or(&text);
+        let text = without_tests(&text);
         let is_database = WRITING_DATABASES.iter().any(|name| path.ends_with(name));
         for (number, line) in
             text.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//"))
@@ -118,6 +118,16 @@ fn files_alone_writes_and_removes() {
             }
         }
     }
+}
+
+/// A source text up to the tests at its end. A test function elsewhere, or a file of tests that is named, ends nothing.
+fn without_tests(text: &str) -> &str {
+    let mark = "#[cfg(test)]\nmod ";
+    let at = text.match_indices(mark).find(|(at, _)| {
+        let line = text[at + mark.len()..].lines().next();
+        line.is_some_and(|line| line.ends_with('{'))
+    });
+    at.map_or(text, |(at, _)| &text[..at])
 }
 
 /// Every Rust file below a directory, sorted.

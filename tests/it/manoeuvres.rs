@@ -10,7 +10,7 @@ use avastra::episode::{Choice, Moment, Outcome};
 use avastra::geometry::{
     Pose, SMOOTH_STEP_SLOPE_MAX, Vec2, distance_m, smooth_step, unit_vector, wrap_angle,
 };
-use avastra::model::vocabulary::{Light, Priority};
+use avastra::model::vocabulary::{Light, Priority, ShownLights};
 use avastra::model::{NpcFacts, RulesInForce};
 use avastra::rng;
 use avastra::rng::{Rng, Stream};
@@ -305,6 +305,39 @@ fn who_joins_changes_before_its_lane_ends_and_in_the_time_that_it_is_given() {
         joined += 1;
     }
     assert!(joined >= 4, "{joined} trucks joined");
+}
+
+#[test]
+fn lights_are_shown_as_they_are_told() {
+    for (name, label, expected) in [
+        ("queue_with_hazard_lights", "queue()", &[(1, ShownLights::Hazard)][..]),
+        ("tailgates_and_flashes", "tailgater()", &[(1, ShownLights::Flash), (1, ShownLights::Left)][..]),
+    ] {
+        let table = wish(name);
+        let run = run_of(table.space().clone(), 8, 1, &[]);
+        let mut is_done = false;
+        let mut choose = |moment: &Moment| match table.offer(moment.situation, row(&table, label)) {
+            Ok(draw) if !is_done => {
+                is_done = true;
+                Choice::Act(draw)
+            }
+            _ => Choice::Pass,
+        };
+        let mut shown = Vec::new();
+        let log = run.play(0, &mut choose, &mut |world, _, _| {
+            for obstacle in world.obstacles().filter(|obstacle| obstacle.lights != ShownLights::Off) {
+                let one = (obstacle.id, obstacle.lights);
+                if shown.last() != Some(&one) {
+                    shown.push(one);
+                }
+                let sensed = world.sensed();
+                let seen = sensed.objects.iter().find(|object| object.id == obstacle.id);
+                assert!(seen.is_none_or(|object| object.lights == obstacle.lights));
+            }
+        });
+        assert_replays(&run, 0, &log);
+        assert_eq!(shown, expected, "{name}");
+    }
 }
 
 #[test]

@@ -7,7 +7,7 @@ use avastra::ads;
 use avastra::episode::Outcome;
 use avastra::geometry::distance_m;
 use avastra::model::command::IgnoredRules;
-use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
+use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, ShownLights, Side, Then, TimeOfDay, Verb};
 use avastra::sim::{Control, Obstacle, Scene, Start, World};
 
 use crate::world::{assert_replays, run_of, space, space_at};
@@ -38,6 +38,7 @@ fn walks_ahead(side: Side, distance_m: f64, speed_mps: f64, cover: Option<Body>)
         behind_first_m: 0.0,
         siren: false,
         turn: None,
+        lights: ShownLights::Off,
         trajectory: None,
         bearer: None,
     }

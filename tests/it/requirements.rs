@@ -369,7 +369,7 @@ fn a_finding_says_how_often_it_recurs() {
                 Some(_) => avastra::episode::Choice::Pass,
                 None => avastra::episode::Choice::Stop,
             };
-            avastra::episode::run(&setup, choose, &mut |_, _, _| {}).breach_of(table.space(), name).is_some()
+            avastra::episode::run(&setup, choose).breach_of(table.space(), name).is_some()
         };
         assert_eq!((1..=*replays).filter(again).count(), *recurred as usize, "{name}");
     }

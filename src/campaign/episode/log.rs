@@ -188,16 +188,30 @@ impl EpisodeLog {
 
     /// The author's own bodies among the road users: number of the road user, index in the space.
     pub fn own_bodies(&self) -> BTreeMap<u32, usize> {
-        let mut own = BTreeMap::new();
+        self.newcomers().into_iter().flat_map(|(first, effect)| effect.own_bodies(first)).collect()
+    }
+
+    /// The names that road users bear: number of the road user, index of the name in the space.
+    pub fn bearers(&self) -> BTreeMap<u32, usize> {
+        let bearer = |(first, effect): (u32, &Effect)| match effect {
+            Effect::Spawn(request) => Some((first, request.bearer?)),
+            Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) | Effect::Light(_) => None,
+        };
+        self.newcomers().into_iter().filter_map(bearer).collect()
+    }
+
+    /// Each effect that made road users appear, with the number of the first of them.
+    fn newcomers(&self) -> Vec<(u32, &Effect)> {
+        let mut newcomers = Vec::new();
         for step in &self.steps {
             let Outcome::Done { draw, spawned, .. } = &step.outcome else { continue };
             let mut ids = spawned.iter();
             for effect in &draw.effects {
                 let first = ids.by_ref().take(effect.newcomers() as usize).min();
-                own.extend(first.into_iter().flat_map(|first| effect.own_bodies(*first)));
+                newcomers.extend(first.map(|first| (*first, effect)));
             }
         }
-        own
+        newcomers
     }
 
     /// Digest of every bit of the world's state after every tick ([`Trace`]); zeros if there was no step.

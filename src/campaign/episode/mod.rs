@@ -4,6 +4,7 @@
 //!
 //! Does not know which agent or which driving system it runs.
 
+mod chronicle;
 mod facts;
 mod log;
 mod margins;
@@ -22,7 +23,7 @@ pub use margins::{MarginSeries, margins_over_time};
 pub use monitor::{Breach, Margin};
 pub use precrash::PreCrash;
 pub use recorder::{Actor, Lights, Phase, Recorder, Sample, Sky, Touch};
-pub use run::{Choice, Moment, Play, Watch, run, run_from};
+pub use run::{Choice, Moment, Play, Watch, run, run_from, run_watched};
 pub use script::{Script, ScriptedAction};
 pub use setup::Setup;
 pub use shape::Shape;

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use avastra_base::geometry::{Pose, Vec2};
 use avastra_drivers::Ads;
 use avastra_lang::model::body::BodyParameters;
-use avastra_lang::model::vocabulary::{Body, BodyClass, Level, TimeOfDay};
+use avastra_lang::model::vocabulary::{Body, BodyClass, Level, ShownLights, TimeOfDay};
 use avastra_world::sim::{Contact, DT_S, Obstacle, SignalColour, VehicleParameters, World, friction_scale};
 
 /// The ego vehicle's brake lights are on above this much brake, %. Ours: a brake that only rubs lights nothing.
@@ -49,6 +49,8 @@ pub struct Actor {
     pub samples: Vec<Sample>,
     /// The tick from which its brake lights are on or off; empty until they are on for the first time.
     pub brake_lights: Vec<(u64, bool)>,
+    /// The tick from which it shows what it was told to; empty until that is something.
+    pub lights: Vec<(u64, ShownLights)>,
     /// The phases of manoeuvres that began.
     pub phases: Vec<Phase>,
 }
@@ -138,6 +140,9 @@ impl Recorder {
             }
             let sample = Sample { tick, pose: obstacle.outline.pose, velocity_mps: obstacle.velocity_mps };
             let actor = &mut self.others[place];
+            if actor.lights_at(tick) != obstacle.lights {
+                actor.lights.push((tick, obstacle.lights));
+            }
             actor.note(sample);
             let phase = world.phase(obstacle.id);
             let phase = phase.map(|(manoeuvre, number, tick)| Phase { tick, manoeuvre, number });
@@ -208,6 +213,7 @@ impl Actor {
             first: None,
             samples: Vec::new(),
             brake_lights: Vec::new(),
+            lights: Vec::new(),
             phases: Vec::new(),
         }
     }
@@ -234,6 +240,12 @@ impl Actor {
     pub fn brakes_at(&self, tick: u64) -> bool {
         let changes = self.brake_lights.partition_point(|(from, _)| *from <= tick);
         changes > 0 && self.brake_lights[changes - 1].1 && tick <= self.last_tick()
+    }
+
+    /// What it shows at a tick.
+    pub fn lights_at(&self, tick: u64) -> ShownLights {
+        let changes = self.lights.partition_point(|(from, _)| *from <= tick);
+        changes.checked_sub(1).map_or(ShownLights::Off, |last| self.lights[last].1)
     }
 
     fn note(&mut self, sample: Sample) {

@@ -1,6 +1,5 @@
 //! The loop: act, drive for one observation period, record what happened.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use avastra_drivers::Ads;
@@ -9,14 +8,14 @@ use avastra_lang::model::{BodyWord, Facts, Memory, OutcomeFacts, Trigger, WorldF
 use avastra_search::mdp;
 use avastra_search::mdp::{Danger, Observation};
 use avastra_world::action::{Draw, Offer, Refusal, Situation};
-use avastra_world::sim::{Contact, DT_S, Incident, Sensed, Trace, World};
+use avastra_world::sim::{Contact, DT_S, Sensed, World};
 
+use super::chronicle::Chronicle;
 use super::facts::collision_facts;
-use super::log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
+use super::log::{Collision, End, EpisodeLog, Outcome, StepLog};
 use super::monitor::Monitor;
 use super::script::ScriptedAction;
 use super::setup::Setup;
-use super::trails::Trails;
 
 /// A step with less progress than this counts as stalled, m. The published package: 3 m in five steps.
 const PROGRESS_M_MIN: f64 = 1.0;
@@ -55,7 +54,7 @@ impl<'a> Moment<'a> {
 
     /// Number of collisions up to now.
     pub fn collisions(&self) -> usize {
-        self.play.collisions.len()
+        self.play.collisions().len()
     }
 
     /// Whether anything is still there that the action of a step made appear.
@@ -107,8 +106,17 @@ impl Choice {
     }
 }
 
-/// Plays one episode. `choose` is called once a step, `watch` after every tick and once before the first.
-pub fn run(setup: &Setup, choose: &mut dyn FnMut(&Moment) -> Choice, watch: &mut Watch) -> EpisodeLog {
+/// Plays one episode. `choose` is called once a step.
+pub fn run(setup: &Setup, choose: &mut dyn FnMut(&Moment) -> Choice) -> EpisodeLog {
+    run_watched(setup, choose, &mut |_, _, _| {})
+}
+
+/// As [`run`]; `watch` is called after every tick and once before the first.
+pub fn run_watched(
+    setup: &Setup,
+    choose: &mut dyn FnMut(&Moment) -> Choice,
+    watch: &mut Watch,
+) -> EpisodeLog {
     run_from(setup, None, choose, watch, &mut |_| {})
 }
 
@@ -190,23 +198,14 @@ pub struct Play {
     ads: Box<dyn Ads>,
     sensed: Sensed,
     memory: Memory,
-    steps: Vec<StepLog>,
-    held: Vec<Held>,
-    /// The author's own bodies among the road users, by number.
-    own_bodies: BTreeMap<u32, usize>,
-    collisions: Vec<Collision>,
-    incidents: Vec<Incident>,
-    trails: Trails,
-    /// `None` where nothing is required.
-    monitor: Option<Monitor>,
     /// Seed of the draws of actions, and of the agent's choices.
     seed: u64,
-    trace: Trace,
-    distance_m: f64,
     /// Steps without progress up to now.
     stalled: u32,
     /// When each action last happened, s; empty if the space does not ask.
     happened_s: Vec<f64>,
+    steps: Vec<StepLog>,
+    chronicle: Chronicle,
 }
 
 impl Play {
@@ -218,23 +217,14 @@ impl Play {
         // The driving system looks once before the first step, so that the first observation can show its state.
         ads.drive(&sensed);
         world.sense(&mut sensed);
-        let mut trails = Trails::default();
-        trails.note(&world);
         Play {
+            chronicle: Chronicle::new(setup, &world),
             world,
             ads,
             sensed,
             memory: setup.memory.clone(),
             steps: Vec::new(),
-            held: Vec::new(),
-            own_bodies: BTreeMap::new(),
-            collisions: Vec::new(),
-            incidents: Vec::new(),
-            trails,
-            monitor: Monitor::new(setup),
             seed: setup.seed,
-            trace: Trace::default(),
-            distance_m: 0.0,
             stalled: 0,
             happened_s: match setup.table.space().asks_when_actions_happened() {
                 true => vec![f64::NEG_INFINITY; setup.table.space().actions.len()],
@@ -292,7 +282,7 @@ impl Play {
 
     /// The collisions so far.
     pub fn collisions(&self) -> &[Collision] {
-        &self.collisions
+        &self.chronicle.collisions
     }
 
     fn situation<'s>(&'s self, setup: &'s Setup) -> Situation<'s> {
@@ -317,7 +307,7 @@ impl Play {
         for (nth, id) in newcomers {
             let effect = &draw.effects[nth];
             spawned.extend(id..id + effect.newcomers());
-            self.own_bodies.extend(effect.own_bodies(id));
+            self.chronicle.own_bodies.extend(effect.own_bodies(id));
         }
         self.memory = draw.memory_after.clone();
         if let Some(happened_s) = self.happened_s.get_mut(setup.table.rows()[draw.row].action) {
@@ -350,7 +340,7 @@ impl Play {
         let time_s = self.world.time_s();
         let station_m = self.world.ego_station_m();
         let mut near: Option<Near> = None;
-        let met = self.collisions.len();
+        let met = self.collisions().len();
         let shift = setup.period_shifts.get(self.steps.len()).copied().unwrap_or(0);
         let ticks = (setup.table.space().episode.step_s / DT_S).round() as i64 + i64::from(shift);
         for tick in 0..ticks {
@@ -368,32 +358,45 @@ impl Play {
                 break;
             }
         }
-        let progress_m = self.world.ego_station_m() - station_m;
-        // An ego vehicle that waits for a light does not stall, and its wait does not end a stall. After a contact no
-        // wait counts.
-        if progress_m.abs() >= PROGRESS_M_MIN {
-            self.stalled = 0;
-        } else if !self.collisions.is_empty() || !self.world.waits_for_light() {
-            self.stalled += 1;
-        }
+        self.count_stalled(self.world.ego_station_m() - station_m);
         let outcome = match begun {
             Begun::With(outcome) => outcome,
             Begun::Waiting(waiting) => waiting.in_vain(),
         };
-        let Near { probability: proc, body } = near.unwrap_or(Near { probability: 0.0, body: None });
-        // Of several collisions in a step, the first decides.
-        let facts = match self.collisions.get(met) {
-            Some(first) => collision_facts(first, &self.collisions[..met]),
-            None => OutcomeFacts { proc, near: body, ..OutcomeFacts::default() },
+        let near = near.unwrap_or(Near { probability: 0.0, body: None });
+        let step = StepLog {
+            time_s,
+            state: observation.state,
+            outcome,
+            memory: self.memory.clone(),
+            proc: near.probability,
+            reward: self.reward(setup, near, met, time_s),
+            perception: mdp::perception_counts(&self.world, self.ads.status()),
+            trace: self.chronicle.trace.digest(),
         };
-        let breached = self.monitor.as_ref().map_or(0, |monitor| monitor.breached_since(time_s));
-        let margins = self.monitor.as_mut().map_or(&[][..], Monitor::end_step);
-        let reward = setup.table.space().reward(OutcomeFacts { breached, ..facts }, &self.memory, margins);
-        let trace = self.trace.digest();
-        let state = observation.state;
-        let perception = mdp::perception_counts(&self.world, self.ads.status());
-        let memory = self.memory.clone();
-        self.steps.push(StepLog { time_s, state, outcome, memory, proc, reward, perception, trace });
+        self.steps.push(step);
+    }
+
+    /// An ego vehicle that waits for a light does not stall, and its wait does not end a stall. After a contact no wait counts.
+    fn count_stalled(&mut self, progress_m: f64) {
+        if progress_m.abs() >= PROGRESS_M_MIN {
+            self.stalled = 0;
+        } else if !self.collisions().is_empty() || !self.world.waits_for_light() {
+            self.stalled += 1;
+        }
+    }
+
+    /// The reward of the step since `time_s`, before which there had been `met` collisions. Of several in a step, the first
+    /// decides.
+    fn reward(&mut self, setup: &Setup, near: Near, met: usize, time_s: f64) -> f64 {
+        let Chronicle { collisions, monitor, .. } = &mut self.chronicle;
+        let facts = match collisions.get(met) {
+            Some(first) => collision_facts(first, &collisions[..met]),
+            None => OutcomeFacts { proc: near.probability, near: near.body, ..OutcomeFacts::default() },
+        };
+        let breached = monitor.as_ref().map_or(0, |monitor| monitor.breached_since(time_s));
+        let margins = monitor.as_mut().map_or(&[][..], Monitor::end_step);
+        setup.table.space().reward(OutcomeFacts { breached, ..facts }, &self.memory, margins)
     }
 
     /// Judges and carries out an action whose moment has come.
@@ -415,28 +418,17 @@ impl Play {
         if self.ads.failure().is_some() {
             return None;
         }
-        let status = self.ads.status();
-        if self.held.last().is_none_or(|held| !held.still(status)) {
-            self.held.push(Held::new(self.world.time_s(), status));
-        }
+        self.chronicle.note_answer(&self.world, self.ads.as_ref());
         let contacts = self.world.tick(&control).to_vec();
-        for &contact in &contacts {
-            self.collisions.push(self.collision(contact));
-        }
-        self.incidents.extend_from_slice(self.world.incidents());
-        self.trails.note(&self.world);
-        if let Some(monitor) = self.monitor.as_mut().filter(|_| self.collisions.is_empty()) {
-            monitor.judge(setup, (&self.world, &self.own_bodies), &self.memory, self.steps.len());
-        }
-        self.distance_m += self.world.ego().speed_mps * DT_S;
-        self.world.trace(&mut self.trace);
+        self.chronicle.note(setup, self.steps.len(), &self.memory, &self.world, &contacts);
         watch(&self.world, self.ads.as_ref(), &contacts);
+        let body = |id| self.chronicle.body(&self.world, id);
         if let Some(contact) = contacts.first() {
-            return Some(Near { probability: 1.0, body: self.body(contact.obstacle) });
+            return Some(Near { probability: 1.0, body: body(contact.obstacle) });
         }
-        let is_hit = |id| self.collisions.iter().any(|collision| collision.contact.obstacle == id);
-        let Danger { probability, nearest } = setup.proc.danger(&self.world, &is_hit);
-        Some(Near { probability, body: nearest.and_then(|id| self.body(id)) })
+        let Danger { probability, nearest } =
+            setup.proc.danger(&self.world, &|id| self.chronicle.has_hit(id));
+        Some(Near { probability, body: nearest.and_then(body) })
     }
 
     /// Whether the condition of a trigger holds now.
@@ -453,31 +445,6 @@ impl Play {
         let facts =
             Facts { road: Some(&setup.road.facts), world: Some(&world), ..Facts::new(&[], &self.memory) };
         evaluate(condition, &setup.table.space().functions, &facts).truth()
-    }
-
-    fn body(&self, obstacle: u32) -> Option<BodyWord> {
-        let own = self.own_bodies.get(&obstacle).copied();
-        self.world.obstacle(obstacle).map(|obstacle| BodyWord { like: obstacle.body, own })
-    }
-
-    fn collision(&self, contact: Contact) -> Collision {
-        let obstacle =
-            self.world.obstacle(contact.obstacle).expect("an obstacle stays for some time after it is hit");
-        let has_crashed = self
-            .incidents
-            .iter()
-            .any(|incident| [incident.obstacle, incident.other].contains(&contact.obstacle));
-        let (shape, kind) = self.trails.kind(&self.world, &contact, has_crashed);
-        Collision {
-            contact,
-            shape,
-            kind,
-            step: self.steps.len(),
-            body: BodyWord { like: obstacle.body, own: self.own_bodies.get(&contact.obstacle).copied() },
-            mass_t: self.world.body(contact.obstacle).map_or(0.0, |body| body.mass_t),
-            verb: obstacle.verb,
-            spawned_s: obstacle.spawned_tick as f64 * DT_S,
-        }
     }
 
     /// The end of an episode whose driving system cannot drive any more.
@@ -508,7 +475,8 @@ impl Play {
 
     /// The log of the episode, which ended so.
     pub fn into_log(self, setup: &Setup, end: End) -> EpisodeLog {
-        let (breaches, margins) = self.monitor.map_or_else(Default::default, Monitor::found);
+        let Chronicle { held, collisions, incidents, monitor, distance_m, .. } = self.chronicle;
+        let (breaches, margins) = monitor.map_or_else(Default::default, Monitor::found);
         EpisodeLog {
             road: setup.road.name.clone(),
             ads: setup.ads.name().to_owned(),
@@ -518,17 +486,17 @@ impl Play {
             seed: setup.seed,
             start: setup.start,
             memory: setup.memory.clone(),
-            collisions: self.collisions,
-            incidents: self.incidents,
+            collisions,
+            incidents,
             breaches,
             margins,
             end,
             duration_s: self.world.time_s(),
-            distance_m: self.distance_m,
+            distance_m,
             red_runs: self.world.red_runs(),
             ticks: self.world.ticks(),
             steps: self.steps,
-            held: self.held,
+            held,
         }
     }
 }

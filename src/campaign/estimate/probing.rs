@@ -126,7 +126,7 @@ fn sampled(
         steps.push(step);
         choice
     };
-    let log = episode::run(&setup, &mut choices, &mut |_, _, _| {});
+    let log = episode::run(&setup, &mut choices);
     record.note_whole(&log);
     record.simulated_s += log.duration_s;
     let whole_s = log.duration_s;

@@ -159,7 +159,7 @@ fn before_each<T>(
     };
     let kept = ticks(REWIND_S) + ticks(WATCH_S);
     let mut recording: VecDeque<World> = VecDeque::with_capacity(kept);
-    episode::run(setup, &mut choose, &mut |world, _, contacts| {
+    episode::run_watched(setup, &mut choose, &mut |world, _, contacts| {
         for contact in contacts {
             judged.push(judge(recording.make_contiguous(), contact, world.ego_outline()));
         }

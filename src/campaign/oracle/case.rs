@@ -219,7 +219,7 @@ impl<'a> Case<'a> {
 /// Plays an episode and records where all other road users were.
 pub(super) fn play(setup: &Setup, mut choose: impl FnMut(&Moment) -> Choice) -> (EpisodeLog, Arc<Foresight>) {
     let mut foresight = Foresight::default();
-    let log = episode::run(setup, &mut choose, &mut |world, _, _| {
+    let log = episode::run_watched(setup, &mut choose, &mut |world, _, _| {
         foresight.record(world.ticks(), world.obstacles());
     });
     (log, Arc::new(foresight))

@@ -43,7 +43,7 @@ pub fn breached(setup: &Setup, script: &Script, log: &EpisodeLog) -> Vec<Breache
             Ordering::Equal => Choice::Pass,
             Ordering::Greater => Choice::Stop,
         };
-        let again = episode::run(&setup, &mut choose, &mut |_, _, _| {});
+        let again = episode::run(&setup, &mut choose);
         for (breached, first) in found.iter_mut().zip(&firsts) {
             let breaks = again
                 .breaches

@@ -58,7 +58,7 @@ pub(super) fn measure(case: &Case, own: &ModularConfig, baseline: &ModularConfig
     let What::Collision { collision, .. } = case.what else { return Vec::new() };
     let contact = &collision.contact;
     let mut gauge = Gauge { obstacle: contact.obstacle, contact_s: contact.time_s, ..Gauge::default() };
-    episode::run(
+    episode::run_watched(
         case.setup,
         &mut |moment| case.script.choose(case.setup.table, moment),
         &mut |world, ads, _| gauge.look(world, ads),

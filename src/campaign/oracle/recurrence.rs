@@ -64,7 +64,7 @@ impl<'a> Replayed<'a> {
                 ..setup.clone()
             };
             let mut choose = |moment: &Moment| script.choose(setup.table, moment);
-            episode::run(&setup, &mut choose, &mut |_, _, _| {})
+            episode::run(&setup, &mut choose)
         };
         Replayed { setup, log, again: (1..=replays).map(play).collect() }
     }

@@ -200,7 +200,7 @@ impl<'a> Search<'a> {
             }
             _ => candidate.script.choose(setup.table, moment),
         };
-        episode::run(&setup, choose, &mut |_, _, _| {})
+        episode::run(&setup, choose)
     }
 
     fn begin(&self, candidate: &Candidate) -> Setup<'_> {

@@ -120,7 +120,7 @@ impl Run {
     fn played_by(&self, setup: &episode::Setup, mut agent: Box<dyn Agent>) -> (EpisodeLog, f64) {
         agent.begin();
         let mut choose = |moment: &Moment| choose(agent.as_mut(), moment).0;
-        let log = episode::run(setup, &mut choose, &mut |_, _, _| {});
+        let log = episode::run(setup, &mut choose);
         (log, agent.branched_s())
     }
 
@@ -170,7 +170,7 @@ impl Run {
         choose: &mut dyn FnMut(&Moment) -> Choice,
         watch: &mut Watch,
     ) -> EpisodeLog {
-        episode::run(&self.setup(number), choose, watch)
+        episode::run_watched(&self.setup(number), choose, watch)
     }
 
     /// Everything that the nth episode is made of but the choices.

@@ -69,7 +69,7 @@ impl<'a> Stage<'a> {
     /// Plays it as it is written down.
     pub fn play(&self, ads: &Selected, watch: &mut Watch) -> EpisodeLog {
         let script = Script::of_scenario(self.scenario);
-        episode::run(&self.setup(ads), &mut |moment| script.choose(self.table, moment), watch)
+        episode::run_watched(&self.setup(ads), &mut |moment| script.choose(self.table, moment), watch)
     }
 
     /// Plays it, and finds its first counted collision, if there is one.

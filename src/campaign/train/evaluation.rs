@@ -48,7 +48,7 @@ pub fn evaluate(
         let mut agent = make();
         agent.begin();
         let mut choose = |moment: &episode::Moment| choose(agent.as_mut(), moment).0;
-        let log = episode::run(&setup, &mut choose, &mut |_, _, _| {});
+        let log = episode::run(&setup, &mut choose);
         let counted = EpisodeSummary::judged(&setup, number as usize, &log).counted() as u64;
         sum += log.steps.iter().map(|step| step.reward).sum::<f64>();
         found.collisions += log.collisions.len() as u64;

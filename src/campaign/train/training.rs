@@ -217,7 +217,7 @@ impl Training {
         let mut setup = self.arena.setup(road.expect("it was played here"), log.seed);
         setup.start = log.start;
         let script = Script::of_log(log);
-        let again = episode::run(&setup, &mut |moment| script.choose(setup.table, moment), &mut |_, _, _| {});
+        let again = episode::run(&setup, &mut |moment| script.choose(setup.table, moment));
         EpisodeLog { end: log.end, ..again }
     }
 }

@@ -81,7 +81,7 @@ pub(super) fn visits(
         let setup = arena.setup((number % arena.roads() as u64) as usize, seed);
         let mut agent = visiting.clone();
         agent.begin();
-        episode::run(&setup, &mut |moment: &Moment| choose(&mut agent, moment).0, &mut |_, _, _| {});
+        episode::run(&setup, &mut |moment: &Moment| choose(&mut agent, moment).0);
     }
     visiting.visits()
 }

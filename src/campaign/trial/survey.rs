@@ -180,7 +180,7 @@ impl<'a> Trials<'a> {
             }
             Choice::of(row, table.offer(moment.situation, row))
         };
-        episode::run(&setup, &mut choose, &mut |_, _, _| {})
+        episode::run(&setup, &mut choose)
     }
 
     /// The moments of undisturbed drives; those after a row was carried out, if one is given.
@@ -194,7 +194,7 @@ impl<'a> Trials<'a> {
             let mut open = before.map_or_else(VecDeque::new, |row| self.with_makers(row));
             let mut offered = Vec::new();
             let mut snapshots: Vec<(World, Box<dyn Ads>)> = Vec::new();
-            let log = episode::run(
+            let log = episode::run_watched(
                 &setup,
                 &mut |moment| {
                     offered.push(open.is_empty().then(|| table.offers(moment.situation)));

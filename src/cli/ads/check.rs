@@ -218,7 +218,7 @@ impl Checks<'_> {
         let mut choose = |moment: &episode::Moment| {
             if moment.step >= steps { Choice::Stop } else { choose(agent.as_mut(), moment).0 }
         };
-        episode::run(&setup, &mut choose, &mut |_, _, _| {})
+        episode::run(&setup, &mut choose)
     }
 
     /// Whether an episode went as before.

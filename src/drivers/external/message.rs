@@ -98,7 +98,7 @@ macro_rules! schemas_of_words {
     };
 }
 
-schemas_of_words!(Observation, AnswerKind, Class, Light, TurnWord, SignWord, PrecedenceWord);
+schemas_of_words!(Observation, AnswerKind, Class, Light, TurnWord, SignWord, PrecedenceWord, VehicleLights);
 
 words! {
     /// What a driving system is shown.
@@ -117,6 +117,11 @@ words! {
         Car = "car", Truck = "truck", Bus = "bus", Motorcycle = "motorcycle", Cyclist = "cyclist",
         Pedestrian = "pedestrian", Animal = "animal", Object = "object", Unknown = "unknown",
     }
+}
+
+words! {
+    /// Lights that a vehicle shows beside its headlights: indicators on both sides or on one, or headlights that are flashed.
+    pub enum VehicleLights { Hazard = "hazard", Left = "left", Right = "right", Flash = "flash" }
 }
 
 words! {
@@ -388,6 +393,8 @@ message! {
         length: f64; width: f64; height: f64;
         /// How much of it is in sight, from 0 to 1.
         visible: f64;
+        ? /// What a vehicle shows that shows something.
+        lights: VehicleLights;
     }
 }
 

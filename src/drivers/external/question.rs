@@ -6,7 +6,7 @@ use crate::driver::Ads;
 use crate::modular::Modular;
 use crate::status::PerceivedObject;
 use avastra_base::geometry::{Pose, Vec2, unit_vector, wrap_angle};
-use avastra_lang::model::vocabulary::Body;
+use avastra_lang::model::vocabulary::{Body, ShownLights};
 use avastra_road::{LaneIndex, Neighbour, Precedence, RoadMap, Side, SignKind, Turn};
 use avastra_world::sim::{DT_S, EgoMotion, Scene, Sensed, SignalColour, VehicleParameters};
 
@@ -14,7 +14,7 @@ use super::message::{
     Class, ConditionsMessage, CrosswalkMessage, EgoMessage, Goal, Init, LaneMessage, LaneSign, LaneStop,
     Light, Map, NeighborMessage, ObjectMessage, PROTOCOL, Point, PrecedenceWord, Reset, RouteChange,
     RouteMessage, RouteSign, RouteStop, RouteStretch, SignWord, SignalPlace, SignalState, Start, Step,
-    TurnWord, Vehicle,
+    TurnWord, Vehicle, VehicleLights,
 };
 use super::settings::ExternalSettings;
 
@@ -259,6 +259,7 @@ pub fn step(
             Some(observer) => each(&observer.status().perceived, believed),
             None => each(&sensed.objects, |object| ObjectMessage {
                 visible: number(object.visible_fraction),
+                lights: shown(object.lights),
                 ..believed(&PerceivedObject::as_it_is(object))
             }),
         },
@@ -324,6 +325,18 @@ fn believed(object: &PerceivedObject) -> ObjectMessage {
         width: number(object.width_m),
         height: number(object.height_m),
         visible: 1.0,
+        lights: None,
+    }
+}
+
+/// The lights that a vehicle was told to show.
+fn shown(lights: ShownLights) -> Option<VehicleLights> {
+    match lights {
+        ShownLights::Off => None,
+        ShownLights::Hazard => Some(VehicleLights::Hazard),
+        ShownLights::Left => Some(VehicleLights::Left),
+        ShownLights::Right => Some(VehicleLights::Right),
+        ShownLights::Flash => Some(VehicleLights::Flash),
     }
 }
 

@@ -11,11 +11,13 @@ use super::xml::number;
 /// Columns: `time_s`; `id` (0 is the ego vehicle, others as claims number them); `body`; `x_m`, `y_m` of the middle of the
 /// outline, in the plane of the map; `heading_rad`; `vx_mps`, `vy_mps` in the same plane; `length_m`, `width_m`,
 /// `height_m`; `contact`: 1 at the end of the tick in which it and the ego vehicle began to touch; `like`: the body of the
-/// engine that `body` is, or that a body of the author's own is like. By rising time, then in order of appearance.
+/// engine that `body` is, or that a body of the author's own is like; `name`: the one that it bears, if it bears one; `along_m`,
+/// `left_m`: where its middle is along the ego vehicle's route, and to the left of that; `lights` that a vehicle was told to show.
+/// By rising time, then in order of appearance.
 pub fn csv(recording: &Recording) -> String {
-    let mut text =
-        "time_s,id,body,x_m,y_m,heading_rad,vx_mps,vy_mps,length_m,width_m,height_m,contact,like\n"
-            .to_owned();
+    let mut text = "time_s,id,body,x_m,y_m,heading_rad,vx_mps,vy_mps,length_m,width_m,height_m,contact,like,\
+         name,along_m,left_m,lights\n"
+        .to_owned();
     for tick in 0..=recording.seen.end_tick {
         let touched = |id: u32| {
             recording.seen.touches.iter().any(|touch| touch.tick == tick && (touch.id == id || id == 0))
@@ -26,10 +28,11 @@ pub fn csv(recording: &Recording) -> String {
             else {
                 continue;
             };
+            let beside = recording.road.route.path.project(sample.pose.position);
             let like = if actor.id == 0 { "ego" } else { actor.body.name() };
             let _ = writeln!(
                 text,
-                "{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
                 number(tick as f64 * DT_S),
                 actor.id,
                 recording.own_bodies.get(&actor.id).map_or(like, String::as_str),
@@ -43,6 +46,10 @@ pub fn csv(recording: &Recording) -> String {
                 number(actor.shape.height_m),
                 u8::from(touched(actor.id)),
                 like,
+                recording.names.get(&actor.id).map_or("", String::as_str),
+                number(beside.station_m),
+                number(beside.offset_m),
+                actor.lights_at(tick).name(),
             );
         }
     }

@@ -40,6 +40,8 @@ pub struct Recording {
     pub told: Vec<Told>,
     /// Names of the author's own bodies, by number of the road user.
     pub own_bodies: BTreeMap<u32, String>,
+    /// The names that road users bear, likewise.
+    pub names: BTreeMap<u32, String>,
     /// Where the scenario comes from, what it claims, and the scenario as text of the language: name and value.
     pub facts: Vec<(String, String)>,
 }
@@ -105,6 +107,7 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
         facts.extend((!lacks.is_empty()).then(|| (SCENARIO_TEXT_LACKS.to_owned(), lacks.join("; "))));
     }
     let named = |(id, own): (u32, usize)| (id, table.space().bodies[own].name.clone());
+    let borne = |(id, bearer): (u32, usize)| (id, table.space().bearers[bearer].clone());
     Ok(Recording {
         name: scenario.name.clone(),
         docs: scenario.docs.clone(),
@@ -116,6 +119,7 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
         road: road.clone(),
         told: told(&log, &facts_at_first),
         own_bodies: log.own_bodies().into_iter().map(named).collect(),
+        names: log.bearers().into_iter().map(borne).collect(),
         facts,
     })
 }

@@ -11,7 +11,7 @@ use avastra_campaign::emit::{identifier, lane_point, quoted};
 use avastra_campaign::episode::{EpisodeLog, Outcome};
 use avastra_lang::model::body::parameters;
 use avastra_lang::model::command::{Command, IgnoredRules};
-use avastra_lang::model::vocabulary::{Body, Phenomenon, TrajectoryField, Verb, Word};
+use avastra_lang::model::vocabulary::{Body, Phenomenon, ShownLights, TrajectoryField, Verb, Word};
 use avastra_lang::model::{
     BodyDef, LightProgram, Memory, Road, SPAWN_SPEED_MPS, Scenario, Space, TrajectoryDef, ticks_s,
 };
@@ -201,6 +201,9 @@ impl<'a> Actions<'a> {
         if request.siren {
             fields.push("siren: true".to_owned());
         }
+        if request.lights != ShownLights::Off {
+            fields.push(format!("lights: {}", request.lights.name()));
+        }
         if let Some(turn) = request.turn {
             fields.push(format!("turn: {}", turn.name()));
         }
@@ -355,6 +358,7 @@ fn command_fields(space: &Space, command: &Command) -> String {
         ignores,
         siren,
         turn,
+        lights,
     } = command;
     let figure = |name: &str, value: &Option<f64>, unit: &str| {
         value.map(|value| format!("{name}: {} {unit}", decimal(value, false)))
@@ -377,6 +381,7 @@ fn command_fields(space: &Space, command: &Command) -> String {
         ignores.map(ignored_field),
         siren.map(|siren| format!("siren: {siren}")),
         turn.map(|turn| format!("turn: {}", turn.name())),
+        lights.map(|lights| format!("lights: {}", lights.name())),
     ];
     fields.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }

@@ -19,7 +19,7 @@ use avastra_campaign::oracle::{ClaimResult, Recurrence, ReferenceDrive, Regressi
 use avastra_campaign::run;
 use avastra_campaign::run::{Gauges, RunError, Stage, refusal_in_words};
 use avastra_drivers::Selected;
-use avastra_lang::model::vocabulary::Word;
+use avastra_lang::model::vocabulary::{ShownLights, Word};
 use avastra_lang::model::{Claim, Obstacle, RequirementDef, Scenario};
 use avastra_world::action::{ActionTable, Offer};
 use avastra_world::sim::{DT_S, FRAME_TICKS, SignalColour};
@@ -166,7 +166,7 @@ fn played(
         }
         script.choose(table, moment)
     };
-    let log = episode::run(&setup, &mut choose, &mut |world, ads, contacts| {
+    let log = episode::run_watched(&setup, &mut choose, &mut |world, ads, contacts| {
         recorder.note(world, ads, contacts);
         mind.note(world, ads, contacts);
         gauges.note(world, contacts);
@@ -399,6 +399,10 @@ fn obstacles(
             "speed_mps": columns.add(SPEED_MPS, actor.samples.iter().map(Sample::speed_mps)),
             "brake_lights": actor.brake_lights,
         });
+        if !actor.lights.is_empty() {
+            let named = |(tick, lights): &(u64, ShownLights)| (*tick, lights.name());
+            one["lights"] = json!(actor.lights.iter().map(named).collect::<Vec<_>>());
+        }
         if !actor.phases.is_empty() {
             let phase = |phase: &Phase| {
                 let name = &table.space().manoeuvres[phase.manoeuvre].name;

@@ -13,8 +13,8 @@ use crate::model::command::{CommandDef, Told};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::rules_by_action;
 use crate::model::vocabulary::{
-    Colour, LIGHT, LaneChoice, LightColour, LightField, Side, Site, SpaceClaim, SpawnField, Then, Turning,
-    Verb, Word,
+    Colour, LIGHT, LaneChoice, LightColour, LightField, ShownLights, Side, Site, SpaceClaim, SpawnField,
+    Then, Turning, Verb, Word,
 };
 use crate::model::{
     ActionDef, BodyWord, Domain, EffectDef, GroupDef, InRow, LightDef, ManoeuvreCall, Parameter, RuleDef,
@@ -530,6 +530,10 @@ impl Checker {
             Some(value) => self.typed(value, place, Type::Bool).map(Some),
             None => Some(None),
         };
+        let lights = match find(SpawnField::Lights) {
+            Some(value) => self.word::<ShownLights>("kind of lights", value, place).map(Some),
+            None => Some(None),
+        };
         let turn = match find(SpawnField::Turn) {
             Some(value) => self.word::<Turning>("turn", value, place).map(Some),
             None => Some(None),
@@ -572,6 +576,7 @@ impl Checker {
             early: early?,
             siren: siren?,
             turn: turn?,
+            lights: lights?,
             bearer: None,
             row: None,
             manoeuvre,
@@ -684,6 +689,7 @@ impl Checker {
                     ("ignores nothing", "rules of the road are for vehicles; leave `ignores` out")
                 }
                 () if on_foot && says(SpawnField::Siren) => ("has no siren", "leave `siren` out"),
+                () if on_foot && says(SpawnField::Lights) => ("has no lights", "leave `lights` out"),
                 () if on_foot && says(SpawnField::Turn) => ("drives through no junction", "leave `turn` out"),
                 () if verb == Verb::Walk && says(SpawnField::Offset) => {
                     ("begins at the kerb", "leave `offset` out")

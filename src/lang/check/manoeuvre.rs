@@ -9,8 +9,8 @@ use crate::check::report::{Report, all_of, as_written, field};
 use crate::model::command::{CommandDef, Moves, Told};
 use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::vocabulary::{
-    Body, CHANGE, CommandField, Fact, LIGHT, LaneChoice, ROAD_USER, Site, SpawnField, TrafficRule, Turning,
-    Verb, Word,
+    Body, CHANGE, CommandField, Fact, LIGHT, LaneChoice, ROAD_USER, ShownLights, Site, SpawnField,
+    TrafficRule, Turning, Verb, Word,
 };
 use crate::model::{
     EnumDef, ManoeuvreCall, ManoeuvreDef, OrderDef, PhaseDef, REPEAT, Type, WordExpr, code, reached, told,
@@ -480,6 +480,10 @@ impl Checker {
             Some(value) => Some(self.word::<Turning>("turn", value, place)?),
             None => None,
         };
+        let lights = match field(fields, CommandField::Lights) {
+            Some(value) => Some(self.word::<ShownLights>("kind of lights", value, place)?),
+            None => None,
+        };
         let says = |wanted: CommandField| field(fields, wanted).is_some();
         let goes_aside = says(CommandField::Lane) || says(CommandField::Offset);
         let (keeps, is_early) = (says(CommandField::Keep), says(CommandField::Early));
@@ -537,6 +541,7 @@ impl Checker {
             ignores,
             siren,
             turn,
+            lights,
         })
     }
 

@@ -11,7 +11,7 @@ use crate::model::value::Type;
 use avastra_base::geometry::SMOOTH_STEP_SLOPE_MAX;
 use avastra_base::units::{Dimension, Rational};
 
-use crate::model::vocabulary::{CommandField, LaneChoice, TrafficRule, Turning, Verb, Word};
+use crate::model::vocabulary::{CommandField, LaneChoice, ShownLights, TrafficRule, Turning, Verb, Word};
 
 /// Speeds that an order or a phase may name, m/s. What of it somebody does, [`Moves`] says.
 const SPEED_MPS: RangeInclusive<f64> = -BACK_MPS_MAX..=SPEED_MPS_MAX;
@@ -42,14 +42,15 @@ impl Told {
     }
 
     /// These figures, and which of the words, in this order.
-    fn all(figures: impl Iterator<Item = CommandField>, words: [bool; 6]) -> Told {
-        const WORDS: [CommandField; 6] = [
+    fn all(figures: impl Iterator<Item = CommandField>, words: [bool; 7]) -> Told {
+        const WORDS: [CommandField; 7] = [
             CommandField::Lane,
             CommandField::Ignores,
             CommandField::Siren,
             CommandField::Turn,
             CommandField::Continuous,
             CommandField::To,
+            CommandField::Lights,
         ];
         let words = WORDS.into_iter().zip(words).filter(|(_, says)| *says).map(|(field, _)| field);
         figures.chain(words).fold(Told::NOTHING, |told, field| told.and(Told::of(&[field])))
@@ -57,11 +58,13 @@ impl Told {
 
     /// What can be told to who does that.
     pub fn to(verb: Verb) -> Told {
-        use CommandField::{Aside, At, Continuous, Early, Offset, Rate, Reach, Speed, Steady};
+        use CommandField::{Aside, At, Continuous, Early, Lights, Offset, Rate, Reach, Speed, Steady};
         match verb {
             Verb::Walk | Verb::Stand => Told::of(&[Speed, Continuous]),
             Verb::WalkAhead | Verb::WalkOpposite => Told::of(&[Speed, Continuous, Offset, Aside]),
-            Verb::Follow => Told::of(&[Speed, Rate, Continuous, Offset, Aside, Early, At, Reach, Steady]),
+            Verb::Follow => {
+                Told::of(&[Speed, Rate, Continuous, Offset, Aside, Early, At, Reach, Steady, Lights])
+            }
             Verb::DriveAhead | Verb::DriveBehind | Verb::Overtake | Verb::DriveOpposite | Verb::CrossRoad => {
                 Told::BY_DRIVERS
             }
@@ -202,6 +205,7 @@ pub struct CommandDef {
     pub ignores: Option<Vec<WordExpr<TrafficRule>>>,
     pub siren: Option<Expr>,
     pub turn: Option<WordExpr<Turning>>,
+    pub lights: Option<WordExpr<ShownLights>>,
 }
 
 /// A command. What is `None` stays as it is.
@@ -228,6 +232,7 @@ pub struct Command {
     pub siren: Option<bool>,
     /// Where it goes at the next junction.
     pub turn: Option<Turning>,
+    pub lights: Option<ShownLights>,
 }
 
 /// How somebody moves to the side: by the smooth step of least jerk.
@@ -402,7 +407,7 @@ impl CommandDef {
 
     /// What it says.
     pub fn told(&self) -> Told {
-        let CommandDef { lane, ignores, siren, turn, continuous, to, .. } = self;
+        let CommandDef { lane, ignores, siren, turn, continuous, to, lights, .. } = self;
         let words = [
             lane.is_some(),
             ignores.is_some(),
@@ -410,6 +415,7 @@ impl CommandDef {
             turn.is_some(),
             continuous.is_some(),
             to.is_some(),
+            lights.is_some(),
         ];
         Told::all(self.figures().map(|figure| figure.field), words)
     }
@@ -428,7 +434,8 @@ impl CommandDef {
         let lane = self.lane.iter().filter_map(WordExpr::expr);
         let ignores = self.ignores.iter().flatten().filter_map(WordExpr::expr);
         let turn = self.turn.iter().filter_map(WordExpr::expr);
-        let words = lane.chain(ignores).chain(&self.siren).chain(turn).chain(&self.continuous);
+        let lights = self.lights.iter().filter_map(WordExpr::expr);
+        let words = lane.chain(ignores).chain(&self.siren).chain(turn).chain(lights).chain(&self.continuous);
         self.figures().map(|figure| figure.expr).chain(words)
     }
 
@@ -443,6 +450,7 @@ impl CommandDef {
             siren: self.siren.as_ref().map(|siren| evaluate(siren, functions, facts).truth()),
             is_continuous: self.continuous.as_ref().is_some_and(|is| evaluate(is, functions, facts).truth()),
             turn: self.turn.as_ref().map(|turn| turn.word(functions, facts)),
+            lights: self.lights.as_ref().map(|lights| lights.word(functions, facts)),
             to: self.to.map(|to| to.bearer(facts.locals)),
             ..Command::default()
         };
@@ -508,9 +516,16 @@ impl Command {
     }
 
     fn told(&self) -> Told {
-        let Command { lane, ignores, siren, turn, is_continuous, to, .. } = *self;
-        let words =
-            [lane.is_some(), ignores.is_some(), siren.is_some(), turn.is_some(), is_continuous, to.is_some()];
+        let Command { lane, ignores, siren, turn, is_continuous, to, lights, .. } = *self;
+        let words = [
+            lane.is_some(),
+            ignores.is_some(),
+            siren.is_some(),
+            turn.is_some(),
+            is_continuous,
+            to.is_some(),
+            lights.is_some(),
+        ];
         let mut command = *self;
         let says = |figure: &Figure| (figure.value)(&mut command).is_some();
         Told::all(FIGURES.into_iter().filter(says).map(|figure| figure.field), words)

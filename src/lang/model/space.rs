@@ -16,8 +16,8 @@ use crate::model::rules::{Bound, Clause};
 use crate::model::trajectory::{Laid, TrajectoryDef};
 use crate::model::value::{EnumIndex, Type, Value};
 use crate::model::vocabulary::{
-    Body, Colour, LaneChoice, Level, LightColour, Phenomenon, Side, Then, TimeOfDay, TrafficRule, Turning,
-    Verb, Word,
+    Body, Colour, LaneChoice, Level, LightColour, Phenomenon, ShownLights, Side, Then, TimeOfDay,
+    TrafficRule, Turning, Verb, Word,
 };
 use crate::syntax::ast::Span;
 use avastra_base::units::{
@@ -356,6 +356,7 @@ pub struct SpawnDef {
     /// Whether it is an emergency vehicle under way.
     pub siren: Option<Expr>,
     pub turn: Option<WordExpr<Turning>>,
+    pub lights: Option<WordExpr<ShownLights>>,
     /// The name that it bears from then on, by index in `Space::bearers`.
     pub bearer: Option<usize>,
     /// Its place in a row of road users; `None` for one that is alone or the first.

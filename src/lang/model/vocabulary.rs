@@ -501,6 +501,7 @@ words! {
     Count "count" = "How many of a row appear, from the first name on: `count: 2`.",
     Ignores "ignores" = "The rules of the road that it ignores: `ignores: [Signals]`.",
     Siren "siren" = "Whether it is an emergency vehicle under way, for which all others wait: `siren: true`.",
+    Lights "lights" = "The lights that a vehicle shows: `Hazard`, `Left`, `Right`, `Flash` or `Off`.",
     Turn "turn" = "Where it goes at the next junction: `Left`, `Straight` or `Right`.",
     Early "early" = "How much before the ego vehicle it is where the two ways cross, if that one keeps its speed: `early: 0.5 s`.",
     Waits "waits" = "How long it stands at the kerb before it sets out: `waits: 2 s`.",
@@ -525,6 +526,7 @@ words! {
     Steady "steady" = "For how long a way before that place it has its `speed` already: `steady: 10 m`.",
     Ignores "ignores" = "The rules of the road that it ignores from then on: `ignores: [Signals]`; `[]` for none.",
     Siren "siren" = "Whether it is an emergency vehicle under way from then on: `siren: false`.",
+    Lights "lights" = "The lights that it shows from then on: `Hazard`, `Left`, `Right`, `Flash` or `Off`.",
     Turn "turn" = "Where it goes at the next junction: `Left`, `Straight` or `Right`.",
     Then "then" = "The manoeuvre that it does from then on: `then: brake(4 m/s^2)`.",
 }
@@ -684,6 +686,15 @@ words! {
 
 words! {
     Turning "Where a vehicle goes at a junction.": Left, Straight, Right
+}
+
+words! {
+    ShownLights "The lights that a vehicle shows beside its headlights.":
+    Off = "None.",
+    Hazard = "All indicators.",
+    Left = "The indicators on its left.",
+    Right = "The indicators on its right.",
+    Flash = "Its headlights, flashed.",
 }
 
 words! {

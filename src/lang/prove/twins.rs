@@ -135,9 +135,11 @@ impl<'a> RowText<'a> {
                 let ignores = ignores.map(|ignores| ignored_form(ignores, &|expr| self.reduced(expr)));
                 let turn =
                     order.command.turn.as_ref().map(|turn| word_form(turn, &|expr| self.reduced(expr)));
+                let lights =
+                    order.command.lights.as_ref().map(|lights| word_form(lights, &|expr| self.reduced(expr)));
                 let to = order.command.to.map(|to| reduced_who(to, &self.locals));
                 format!(
-                    "order {:?} {figures:?} {to:?} {lane:?} {ignores:?} {siren:?} {turn:?} {then:?}",
+                    "order {:?} {figures:?} {to:?} {lane:?} {ignores:?} {siren:?} {turn:?} {lights:?} {then:?}",
                     reduced_who(order.who, &self.locals)
                 )
             }
@@ -193,7 +195,7 @@ fn ignored_form(ignores: &[WordExpr<TrafficRule>], reduced: &impl Fn(&Expr) -> E
 
 fn spawn_form(spawn: &SpawnDef, locals: &[Expr], reduced: &impl Fn(&Expr) -> Expr) -> String {
     format!(
-        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {} {} {:?} {} {:?} {:?} {:?} {:?}",
+        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {} {} {:?} {} {:?} {:?} {:?} {:?}",
         word_form(&spawn.body, reduced),
         word_form(&spawn.colour, reduced),
         word_form(&spawn.verb, reduced),
@@ -207,6 +209,7 @@ fn spawn_form(spawn: &SpawnDef, locals: &[Expr], reduced: &impl Fn(&Expr) -> Exp
         spawn.waits.as_ref().map(|waits| reduced(waits).kind),
         spawn.siren.as_ref().map(|siren| reduced(siren).kind),
         spawn.turn.as_ref().map(|turn| word_form(turn, reduced)),
+        spawn.lights.as_ref().map(|lights| word_form(lights, reduced)),
         ignored_form(&spawn.ignores, reduced),
         spawn.behind,
         spawn.of.map(|who| reduced_who(who, locals)),

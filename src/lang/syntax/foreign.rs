@@ -133,7 +133,7 @@ pub fn foreign_declaration(word: &str) -> Option<&'static str> {
     Some(match word {
         "const" | "var" | "val" => "let",
         "def" | "func" | "function" => "fn",
-        "import" | "include" | "require" => "use",
+        "import" | "include" => "use",
         "assert" => "expect",
         "constraint" | "invariant" => "rule",
         _ => return None,

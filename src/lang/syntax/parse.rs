@@ -18,7 +18,7 @@ use crate::syntax::keyword::{CLAUSES, DECLARATIONS, OPERATORS};
 use crate::syntax::scan::{Comment, Scan, scan};
 use crate::syntax::{Diagnostic, code, nearest};
 
-/// Most brackets within one another, and most operators within one another.
+/// Most brackets and most `match`es within one another.
 pub const DEPTH_MAX: usize = 64;
 
 /// Most operators in one another, those around brackets included. Trees are walked by recursion.

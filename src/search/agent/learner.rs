@@ -18,6 +18,7 @@ use crate::mdp::Observation;
 use avastra_base::rng;
 use avastra_base::rng::Rng;
 
+use super::checkpoint::{Reader, Writer};
 use super::exploration::ExplorationSettings;
 use super::n_step::transitions;
 use super::network::{Adam, Network};
@@ -31,17 +32,17 @@ use super::trajectory::{Lesson, Trajectory};
 /// A learning agent.
 pub struct Learner {
     /// The online network, and how it acts.
-    pub(super) policy: QPolicy,
+    policy: QPolicy,
     /// The mean of the online networks, which acts in the end, if the settings ask for one.
-    pub(super) average: Option<QPolicy>,
-    pub(super) target: Network,
-    pub(super) adam: Adam,
-    pub(super) replay: Replay,
+    average: Option<QPolicy>,
+    target: Network,
+    adam: Adam,
+    replay: Replay,
     exploration: ExplorationSettings,
     /// Choices made.
-    pub(super) steps: u64,
+    steps: u64,
     /// Updates made.
-    pub(super) updates: u64,
+    updates: u64,
     /// The share of the training's episodes that are over.
     over: f64,
 }
@@ -53,6 +54,24 @@ impl Learner {
         let target = policy.network.clone();
         let average = (policy.settings.average_decay > 0.0).then(|| policy.clone());
         Learner { policy, average, target, adam, replay, exploration, steps: 0, updates: 0, over: 0.0 }
+    }
+
+    /// A new learner as the one that was saved; `None` if the bytes are not those of a learner with such settings and rows.
+    pub(super) fn restored(mut self, bytes: &[u8]) -> Option<Learner> {
+        let mut bytes = Reader::new(bytes)?;
+        self.steps = bytes.u64()?;
+        self.updates = bytes.u64()?;
+        self.policy.quirks.restore(&mut bytes)?;
+        let networks = [Some(&mut self.policy.network), Some(&mut self.target)];
+        let average = self.average.as_mut().map(|average| &mut average.network);
+        for network in networks.into_iter().chain([average]).flatten() {
+            let parameters = network.parameters().len();
+            network.parameters_mut().copy_from_slice(&bytes.f32s(parameters)?);
+        }
+        self.adam.restore(&mut bytes)?;
+        let sizes = (self.policy.features.len(), self.policy.rows.allowed.len());
+        self.replay = Replay::restored(self.policy.settings().replay, sizes, &mut bytes)?;
+        bytes.is_at_end().then_some(self)
     }
 
     /// What acts after the training.
@@ -115,11 +134,7 @@ impl Trainable for Learner {
 
     /// Keeps what the episode showed, and makes the updates that its steps are worth.
     fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Lesson {
-        let payment = &self.policy.settings.payment;
-        let rewards = match payment.pays_maker {
-            true => payment.paid_to_makers(episode),
-            false => self.policy.quirks.rewards(episode),
-        };
+        let rewards = self.policy.rewards(episode);
         for transition in transitions(episode, &rewards, &self.policy) {
             self.replay.push(transition);
         }
@@ -154,7 +169,18 @@ impl Trainable for Learner {
     }
 
     fn save(&self) -> Vec<u8> {
-        self.to_bytes()
+        let mut bytes = Writer::new();
+        bytes.u64(self.steps);
+        bytes.u64(self.updates);
+        self.policy.quirks.save(&mut bytes);
+        bytes.f32s(self.policy.network.parameters());
+        bytes.f32s(self.target.parameters());
+        if let Some(average) = &self.average {
+            bytes.f32s(average.network.parameters());
+        }
+        self.adam.save(&mut bytes);
+        self.replay.save(&mut bytes);
+        bytes.into_bytes()
     }
 }
 

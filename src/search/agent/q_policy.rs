@@ -19,6 +19,7 @@ use super::quirks::Quirks;
 use super::random::any;
 use super::registry::Agent;
 use super::settings::{SettingsError, hint};
+use super::trajectory::Trajectory;
 
 /// What the agent sees and may do.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -182,6 +183,15 @@ impl QPolicy {
         let rows = self.rows.allowed.iter().zip(candidates).enumerate();
         let passes = |row: usize| self.quirks.lets_pass(row, self.rows.environment[row]);
         rows.map(|(row, (&allowed, candidate))| allowed && candidate && passes(row)).collect()
+    }
+
+    /// What each step of an episode earns, shape `(steps,)`, as the settings pay it.
+    pub(super) fn rewards(&self, episode: &Trajectory) -> Vec<f64> {
+        let payment = &self.settings.payment;
+        match payment.pays_maker {
+            true => payment.paid_to_makers(episode),
+            false => self.quirks.rewards(episode),
+        }
     }
 
     /// Takes note of the row that was chosen.

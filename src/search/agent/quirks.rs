@@ -7,6 +7,7 @@
 use avastra_base::rng;
 use avastra_base::rng::Rng;
 
+use super::checkpoint::{Reader, Writer};
 use super::learner::LearnerSettings;
 use super::random::any;
 use super::trajectory::Trajectory;
@@ -26,7 +27,7 @@ pub(super) struct Quirks {
     /// chosen at random; 0: random choices are uniform.
     random_decay: f64,
     /// How likely each row is when a row is chosen at random, shape `(rows,)`.
-    pub random_weights: Vec<f64>,
+    random_weights: Vec<f64>,
     /// The last row of this episode that changed weather or time, and the steps since then.
     last_environment: Option<(usize, u32)>,
 }
@@ -42,6 +43,16 @@ impl Quirks {
             random_weights: vec![1.0; rows],
             last_environment: None,
         }
+    }
+
+    pub fn save(&self, bytes: &mut Writer) {
+        bytes.f64s(&self.random_weights);
+    }
+
+    /// Takes on what was saved; `None` if the bytes end too soon.
+    pub fn restore(&mut self, bytes: &mut Reader<'_>) -> Option<()> {
+        self.random_weights = bytes.f64s(self.random_weights.len())?;
+        Some(())
     }
 
     /// A new episode begins, with the gate open.

@@ -155,6 +155,7 @@ fn perception_differences<'a>(
 mod tests {
     use super::*;
     use avastra_base::geometry::{OrientedBox, Pose};
+    use avastra_lang::model::vocabulary::ShownLights;
     use avastra_lang::model::vocabulary::{Body, Colour, Verb};
 
     #[test]
@@ -180,6 +181,7 @@ mod tests {
             distance_m: 5.0,
             acceleration_mps2: 0.0,
             spawned_tick: 0,
+            lights: ShownLights::Off,
         };
         let object = |id: Option<u32>, x_m, heading_rad| PerceivedObject {
             id,

@@ -17,7 +17,7 @@ use avastra_lang::model::expr::{Expr, Who};
 use avastra_lang::model::rules::{
     Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,
 };
-use avastra_lang::model::vocabulary::Verb;
+use avastra_lang::model::vocabulary::{ShownLights, Verb};
 use avastra_lang::model::{
     ActionDef, BodyWord, Domain, EARLY_S, EffectDef, Facts, LIGHT_AT_M, LightDef, MEET, ManoeuvreCall,
     Memory, MomentFacts, NpcFacts, OrderDef, Parameter, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value,
@@ -414,6 +414,7 @@ impl<'a> Judge<'a> {
                 .map(|waits| rounded_into(evaluate(waits, functions, &facts).number(), WAITS_S)),
             siren: spawn.siren.as_ref().is_some_and(|siren| evaluate(siren, functions, &facts).truth()),
             turn: spawn.turn.as_ref().map(|turn| turn.word(functions, &facts)),
+            lights: spawn.lights.as_ref().map_or(ShownLights::Off, |lights| lights.word(functions, &facts)),
             trajectory: trajectory.map(|index| OnTrajectory { index, begins }),
             behind_first_m,
             bearer: spawn.bearer,

@@ -4,7 +4,8 @@ use avastra_lang::model::body::OwnBody;
 use avastra_lang::model::command::{Command, IgnoredRules, Told};
 use avastra_lang::model::expr::Expr;
 use avastra_lang::model::vocabulary::{
-    Body, Colour, LaneChoice, Level, LightColour, Phenomenon, Side, Then, TimeOfDay, Turning, Verb,
+    Body, Colour, LaneChoice, Level, LightColour, Phenomenon, ShownLights, Side, Then, TimeOfDay, Turning,
+    Verb,
 };
 use avastra_lang::model::{
     Memory, MomentFacts, NpcFacts, Space, SpawnFacts, SpawnFigures, StateDef, StateMeaning,
@@ -85,6 +86,8 @@ pub struct SpawnRequest {
     pub siren: bool,
     /// Where it goes at the next junction; with `CrossRoad` at the one where it crosses the ego vehicle's way.
     pub turn: Option<Turning>,
+    /// What lights a vehicle shows.
+    pub lights: ShownLights,
     /// The trajectory that it follows; `distance_m` is then its station there.
     pub trajectory: Option<OnTrajectory>,
     /// How far it drives behind the first one of its row, m; for `CrossRoad`, where the distance is that of their meeting place.

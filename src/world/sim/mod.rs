@@ -4,14 +4,15 @@
 //! same in all episodes of a road, and is shared. Time passes in ticks of [`DT_S`] (50 Hz). A tick does,
 //! in this order (`World::tick`):
 //!
-//! 1. The ego vehicle moves by its pedals and wheel (`ego`), and its place beside the route is found.
-//! 2. The other road users move one after another, each among the others as they stand at that moment
+//! 1. Every fifth tick it is noted who goes first (`right_of_way`); manoeuvres go on (`world/commands`).
+//! 2. The ego vehicle moves by its pedals and wheel (`ego`), and its place beside the route is found.
+//! 3. The other road users move one after another, each among the others as they stand at that moment
 //!    (`road_user`, `around`). A driver looks around every fifth tick and then follows, stops or changes
 //!    lanes (`npc`); a pedestrian walks or waits (`pedestrian`).
-//! 3. A road user that would move into another shares its momentum with it (`incident`), and so does one that
+//! 4. A road user that would move into another shares its momentum with it (`incident`), and so does one that
 //!    the ego vehicle touches (`contact`). Both come to rest by friction, and leave when out of sight.
-//! 4. Twice a second, ambient traffic leaves and appears (`ambient`).
-//! 5. Every fifth tick, water rises and drains (`environment`) and lines of sight are worked out (`sense`).
+//! 5. A light that was told to changes; twice a second, ambient traffic leaves and appears (`ambient`).
+//! 6. Every fifth tick, water rises and drains (`environment`) and lines of sight are worked out (`sense`).
 //!
 //! Between ticks an action may change the sky or the time of day, or make a road user appear
 //! (`World::apply`). `placement` decides where it appears, along which `way`, or why it cannot;

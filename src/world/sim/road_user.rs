@@ -7,7 +7,7 @@ use crate::action::{Course, LaterMoment};
 use avastra_base::geometry::{OrientedBox, Pose, Sweep, Vec2, distance_m, unit_vector};
 use avastra_base::kinematics::GRAVITY_MPS2;
 use avastra_lang::model::command::{Command, Moves};
-use avastra_lang::model::vocabulary::{Body, Colour, TrafficRule, Verb};
+use avastra_lang::model::vocabulary::{Body, Colour, ShownLights, TrafficRule, Verb};
 use avastra_road::is_apart;
 
 use super::ambient::COMMANDED_MAX;
@@ -57,6 +57,8 @@ pub struct Obstacle {
     /// Gap between its outline and the ego vehicle's, m; 0 if they touch.
     pub distance_m: f64,
     pub spawned_tick: u64,
+    /// What it was told to show.
+    pub lights: ShownLights,
 }
 
 impl Obstacle {
@@ -452,6 +454,7 @@ impl RoadUser {
             is_apart: false,
             distance_m: distance_m(around.ego_outline, &outline),
             spawned_tick: around.tick,
+            lights: ShownLights::Off,
         };
         let mut newcomer = RoadUser { obstacle, mover };
         newcomer.obstacle.is_apart = around.is_apart_from_ego(&newcomer);
@@ -474,7 +477,10 @@ impl RoadUser {
 
     /// Every bit that later ticks depend on.
     pub fn trace(&self, trace: &mut Trace) {
-        let Obstacle { id, body, colour, verb, outline, velocity_mps, spawned_tick, .. } = &self.obstacle;
+        let Obstacle { id, body, colour, verb, outline, velocity_mps, spawned_tick, lights, .. } =
+            &self.obstacle;
+        // Nothing is fed for the usual case, as before there were any.
+        trace.words((*lights != ShownLights::Off).then_some(*lights as u64));
         trace.words([u64::from(*id), *spawned_tick, *body as u64, *colour as u64, *verb as u64]);
         let pose = &outline.pose;
         trace.numbers([pose.position.x, pose.position.y, pose.heading_rad]);

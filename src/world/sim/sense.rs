@@ -5,7 +5,7 @@
 //! of it, with its errors and delays, is `ads`.
 
 use avastra_base::geometry::{Frame, OrientedBox, Pose, Vec2, larger};
-use avastra_lang::model::vocabulary::Body;
+use avastra_lang::model::vocabulary::{Body, ShownLights};
 
 use super::road_user::Obstacle;
 use super::world::DT_S;
@@ -80,6 +80,8 @@ pub struct SensedObject {
     pub is_unlit: bool,
     /// Whether it is an emergency vehicle under way.
     pub has_siren: bool,
+    /// The lights that a vehicle shows beside its headlights.
+    pub lights: ShownLights,
 }
 
 /// Light and weather where the ego vehicle is.
@@ -213,6 +215,7 @@ mod tests {
             distance_m: 0.0,
             acceleration_mps2: 0.0,
             spawned_tick: 0,
+            lights: ShownLights::Off,
         }
     }
 

@@ -6,7 +6,9 @@ use crate::action::SpawnRequest;
 use avastra_base::geometry::Vec2;
 use avastra_lang::model::START_MPS;
 use avastra_lang::model::command::IgnoredRules;
-use avastra_lang::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
+use avastra_lang::model::vocabulary::{
+    Body, Colour, LaneChoice, Level, ShownLights, Side, Then, TimeOfDay, Verb,
+};
 use avastra_road::testing::{lanes, road, street};
 use avastra_road::{RoadMap, Route};
 
@@ -89,6 +91,7 @@ pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
         ignores: IgnoredRules::default(),
         siren: false,
         turn: None,
+        lights: ShownLights::Off,
         meet: None,
         waits_s: None,
         early_s: None,

@@ -123,7 +123,7 @@ struct Switch {
 #[derive(Debug, Clone)]
 pub struct World {
     scene: Arc<Scene>,
-    // The state: what later ticks depend on. `trace` covers all of it.
+    // The state: what later ticks depend on. `trace` covers all of it but the profile of traffic, which no tick changes.
     ticks: u64,
     ego: Ego,
     /// Place of the ego vehicle's rear axle beside the route.
@@ -433,6 +433,7 @@ impl World {
                 distance_m: obstacle.distance_m,
                 is_unlit: mover.is_unlit() || obstacle.body == Body::Object,
                 has_siren: mover.has_siren(),
+                lights: obstacle.lights,
             });
         }
     }

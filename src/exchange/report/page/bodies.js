@@ -31,6 +31,14 @@ export function drawBody(canvas, body, { fill, line, dashed = false, alpha = 1 }
     const size = Math.max(0.28, canvas.px(2.5));
     for (const side of [0.38, -0.38]) canvas.dot(beside(body, -length / 2, width * side), size, colours.brake);
   }
+  const lamps = { Hazard: [1, -1], Left: [1], Right: [-1], Flash: [] }[body.lights] ?? [];
+  const size = Math.max(0.22, canvas.px(2));
+  for (const side of lamps) {
+    for (const end of [0.46, -0.46]) canvas.dot(beside(body, length * end, width * side * 0.46), size, colours.warn);
+  }
+  if (body.lights === "Flash") {
+    for (const side of [0.34, -0.34]) canvas.dot(beside(body, length / 2, width * side), size, colours.paper);
+  }
   context.globalAlpha = 1;
 }
 

@@ -78,7 +78,8 @@ export class Recording {
       const { id, body, like, verb, ambient, length_m: length, width_m: width } = one;
       const speed = this.between(one.speed_mps, at);
       const braking = this.#brakes(one, timeS);
-      found.push({ id, body, like, verb, ambient, length, width, ...this.pose(one.places, at), speed, braking });
+      const lights = this.latest(one.lights ?? [], this.tickAt(timeS))?.[1];
+      found.push({ id, body, like, verb, ambient, length, width, ...this.pose(one.places, at), speed, braking, lights });
     }
     return found;
   }

@@ -1,14 +1,16 @@
 //! Adam (Kingma and Ba, 2015, Algorithm 1), with the operations in PyTorch's order.
 
+use crate::agent::checkpoint::{Reader, Writer};
+
 /// The optimiser and its running moments, a mean and a square for each parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Adam {
     learning_rate: f64,
-    pub(in crate::agent) mean: Vec<f32>,
-    pub(in crate::agent) square: Vec<f32>,
+    mean: Vec<f32>,
+    square: Vec<f32>,
     /// Each decay rate to the power of the number of steps, in `f64` so that it does not drift.
-    pub(in crate::agent) mean_power: f64,
-    pub(in crate::agent) square_power: f64,
+    mean_power: f64,
+    square_power: f64,
 }
 
 /// Decay rates of the two moments, and the term that keeps the quotient finite: the algorithm's defaults,
@@ -18,6 +20,21 @@ const SQUARE_DECAY: f64 = 0.999;
 const FLOOR: f32 = 1e-8;
 
 impl Adam {
+    pub(in crate::agent) fn save(&self, bytes: &mut Writer) {
+        bytes.f32s(&self.mean);
+        bytes.f32s(&self.square);
+        bytes.f64s(&[self.mean_power, self.square_power]);
+    }
+
+    /// Takes on the moments that were saved; `None` if the bytes end too soon.
+    pub(in crate::agent) fn restore(&mut self, bytes: &mut Reader<'_>) -> Option<()> {
+        let parameters = self.mean.len();
+        (self.mean, self.square) = (bytes.f32s(parameters)?, bytes.f32s(parameters)?);
+        let powers = bytes.f64s(2)?;
+        (self.mean_power, self.square_power) = (powers[0], powers[1]);
+        Some(())
+    }
+
     /// For a network with `parameters` parameters.
     pub fn new(parameters: usize, learning_rate: f64) -> Adam {
         Adam {

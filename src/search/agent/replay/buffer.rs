@@ -1,5 +1,6 @@
 //! Proportional prioritised replay (Schaul et al., 2016), and with exponent 0 the plain kind.
 
+use crate::agent::checkpoint::{Reader, Writer};
 use crate::agent::settings::{SettingsError, count, positive, require, unit};
 use avastra_base::rng;
 use avastra_base::rng::Rng;
@@ -85,29 +86,46 @@ impl Replay {
         }
     }
 
-    /// A buffer as it was: transitions with their priorities by index. `None` if it has no room for them.
+    pub(in crate::agent) fn save(&self, bytes: &mut Writer) {
+        bytes.u64(self.len() as u64);
+        bytes.u64(self.next as u64);
+        bytes.f64s(&[self.priority_max]);
+        for (at, transition) in self.transitions.iter().enumerate() {
+            bytes.f64s(&[self.tree.get(at)]);
+            bytes.f32s(&transition.inputs);
+            bytes.u64(u64::from(transition.row));
+            bytes.f32s(&[transition.reward, transition.discount]);
+            bytes.f32s(&transition.next_inputs);
+            bytes.flags(&transition.next_legal);
+        }
+    }
+
+    /// A buffer as it was saved, of transitions with so many inputs and rows; `None` if it has no room for them, or the bytes
+    /// end too soon.
     pub(in crate::agent) fn restored(
         settings: ReplaySettings,
-        items: Vec<(Transition, f64)>,
-        next: u64,
-        priority_max: f64,
+        (inputs, rows): (usize, usize),
+        bytes: &mut Reader<'_>,
     ) -> Option<Replay> {
-        let next = usize::try_from(next).ok().filter(|&next| next < settings.replay_capacity)?;
+        let (count, next) = (bytes.u64()?, bytes.u64()?);
+        let priority_max = bytes.f64s(1)?[0];
+        let is_place = |next: &usize| *next < settings.replay_capacity;
+        let next = usize::try_from(next).ok().filter(is_place)?;
+        let count = usize::try_from(count).ok().filter(|count| *count <= settings.replay_capacity)?;
         let mut replay = Replay { next, priority_max, ..Replay::new(settings) };
-        if items.len() > settings.replay_capacity {
-            return None;
-        }
-        for (index, (transition, priority)) in items.into_iter().enumerate() {
+        for index in 0..count {
+            let priority = bytes.f64s(1)?[0];
+            let sight = bytes.f32s(inputs)?;
+            let row = u32::try_from(bytes.u64()?).ok()?;
+            let figures = bytes.f32s(2)?;
+            let next_inputs = bytes.f32s(inputs)?;
+            let next_legal = bytes.flags(rows)?;
+            let (reward, discount) = (figures[0], figures[1]);
+            let transition = Transition { inputs: sight, row, reward, discount, next_inputs, next_legal };
             replay.transitions.push(transition);
             replay.tree.set(index, priority);
         }
         Some(replay)
-    }
-
-    /// Every transition with its priority, the place of the next one, and the largest priority.
-    pub(in crate::agent) fn contents(&self) -> (impl Iterator<Item = (&Transition, f64)>, usize, f64) {
-        let items = self.transitions.iter().enumerate().map(|(at, one)| (one, self.tree.get(at)));
-        (items, self.next, self.priority_max)
     }
 
     pub fn len(&self) -> usize {

@@ -212,8 +212,9 @@ fn commanded(
 /// The newcomer, if there is room for it.
 fn finish(asked: &Asked, motion: Motion, moved: Moved) -> Result<RoadUser, String> {
     let Asked { around, request, size, id, .. } = *asked;
-    let SpawnRequest { body, colour, verb, .. } = *request;
-    let newcomer = RoadUser::new(around, id, body, colour, verb, Mover::new(size, motion), moved);
+    let SpawnRequest { body, colour, verb, lights, .. } = *request;
+    let mut newcomer = RoadUser::new(around, id, body, colour, verb, Mover::new(size, motion), moved);
+    newcomer.obstacle.lights = lights;
     let room_m = if verb == Verb::Follow { GUIDED_ROOM_M } else { ROOM_M };
     match newcomer.who_is_there(around, room_m) {
         None => Ok(newcomer),

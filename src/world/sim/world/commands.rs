@@ -148,6 +148,7 @@ impl World {
         // The phases that are left of a manoeuvre are dropped.
         mover.course = None;
         mover.motion.order(&order.command, to, self.ticks);
+        self.show(index, &order.command);
         Ok(())
     }
 
@@ -185,6 +186,12 @@ impl World {
         } else if self.signals.colour(map, signal, tick) == SignalColour::Green {
             self.signals.stay(map, signal, tick + 1);
         }
+    }
+
+    /// A vehicle shows the lights that it is told to.
+    fn show(&mut self, index: usize, command: &Command) {
+        let lights = &mut self.users[index].obstacle.lights;
+        *lights = command.lights.unwrap_or(*lights);
     }
 
     /// Moves on the manoeuvres of road users, whose phases tell them what to do.
@@ -234,7 +241,10 @@ impl World {
             match to {
                 // Without somebody to whom the gap would be kept that has no value.
                 Some(None) => mover.course = None,
-                to => mover.motion.order(&command, to.flatten(), self.ticks),
+                to => {
+                    mover.motion.order(&command, to.flatten(), self.ticks);
+                    self.show(index, &command);
+                }
             }
         }
     }
