@@ -643,6 +643,7 @@ impl Checker {
         let told = manoeuvre.map_or(Told::NOTHING, |call| self.told(call.manoeuvre));
         let goes_back = has(CommandDef::goes_back);
         let meets_nowhere = has(|command| command.early.is_some() && command.reach.is_none());
+        self.check_place_fields(fields, &possible(verb));
         for verb in possible(verb) {
             let on_foot = verb.is_on_foot();
             let other_way = matches!(verb, Verb::DriveOpposite | Verb::CrossRoad);
@@ -725,6 +726,26 @@ impl Checker {
     }
 
     /// The `then` of a spawn: a word, or a manoeuvre.
+    /// Reports a `lane` and a `side` that mean nothing to any of the verbs.
+    fn check_place_fields(&mut self, fields: &[(SpawnField, &ast::Expr)], verbs: &[Verb]) {
+        let [ahead, behind, overtake] = [Verb::DriveAhead, Verb::DriveBehind, Verb::Overtake];
+        let [cross, walk, stand] = [Verb::CrossRoad, Verb::Walk, Verb::Stand];
+        for (wanted, of) in
+            [(SpawnField::Lane, [ahead, behind, overtake]), (SpawnField::Side, [cross, walk, stand])]
+        {
+            let Some(value) = field(fields, wanted) else { continue };
+            // Of a trajectory it is said elsewhere.
+            let means_nothing = verbs.iter().all(|verb| !of.contains(verb) && *verb != Verb::Follow);
+            if let Some(verb) = verbs.first().filter(|_| means_nothing) {
+                let message = format!("a `{}` means nothing to `{}`", wanted.name(), verb.name());
+                let error =
+                    Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(value.span, "without effect");
+                let names: Vec<&str> = of.iter().map(|verb| verb.name()).collect();
+                self.report(error.help(format!("leave it out; it is for {}", listed(&names))));
+            }
+        }
+    }
+
     fn then(
         &mut self,
         value: &ast::Expr,
@@ -732,6 +753,13 @@ impl Checker {
     ) -> Option<(WordExpr<Then>, Option<ManoeuvreCall>)> {
         match self.manoeuvre_call(value, place) {
             Some(call) => Some((WordExpr::Fixed(Then::Keep), Some(call?))),
+            None if matches!(&value.kind, ast::ExprKind::Name(name) if self.manoeuvre_names.get(name).is_some()) =>
+            {
+                self.look_at(value, place, None);
+                let error = Diagnostic::error(code::TYPE_MISMATCH, "a manoeuvre is given by a call");
+                let help = "write what it is given behind its name: `then: brake(4 m/s^2)`, `then: swerve()`";
+                self.reject(error.at(value.span, "only its name").help(help))
+            }
             None => Some((self.word::<Then>("word for `then`", value, place)?, None)),
         }
     }

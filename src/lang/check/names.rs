@@ -71,7 +71,9 @@ pub(crate) fn unknown<'a>(
     match nearest(name, candidates.iter().copied()) {
         Some(near) => error.meant(span, near),
         // All facts, because whoever asks for one that is missing needs to know what there is.
-        None if !candidates.is_empty() && (candidates.len() <= LISTED_MAX || kind.ends_with(" fact")) => {
+        None if !candidates.is_empty()
+            && (candidates.len() <= LISTED_MAX || kind.ends_with(" fact") || kind == "field") =>
+        {
             error.help(format!("there is {}", listed(&candidates)))
         }
         None => error,

@@ -31,6 +31,7 @@ use super::trajectory::{Lesson, Trajectory};
 
 /// A learning agent.
 pub struct Learner {
+    settings: Arc<LearnerSettings>,
     /// The online network, and how it acts.
     policy: QPolicy,
     /// The mean of the online networks, which acts in the end, if the settings ask for one.
@@ -51,9 +52,20 @@ impl Learner {
     /// A learner that has learned nothing: its first network, an empty replay, an optimiser for this network, and how ε
     /// falls.
     pub fn new(policy: QPolicy, replay: Replay, adam: Adam, exploration: ExplorationSettings) -> Learner {
-        let target = policy.network.clone();
-        let average = (policy.settings.average_decay > 0.0).then(|| policy.clone());
-        Learner { policy, average, target, adam, replay, exploration, steps: 0, updates: 0, over: 0.0 }
+        let (settings, target) = (policy.settings.clone(), policy.network.clone());
+        let average = (settings.average_decay > 0.0).then(|| policy.clone());
+        Learner {
+            settings,
+            policy,
+            average,
+            target,
+            adam,
+            replay,
+            exploration,
+            steps: 0,
+            updates: 0,
+            over: 0.0,
+        }
     }
 
     /// A new learner as the one that was saved; `None` if the bytes are not those of a learner with such settings and rows.
@@ -70,7 +82,7 @@ impl Learner {
         }
         self.adam.restore(&mut bytes)?;
         let sizes = (self.policy.features.len(), self.policy.rows.allowed.len());
-        self.replay = Replay::restored(self.policy.settings().replay, sizes, &mut bytes)?;
+        self.replay = Replay::restored(self.settings.replay, sizes, &mut bytes)?;
         bytes.is_at_end().then_some(self)
     }
 
@@ -81,12 +93,12 @@ impl Learner {
 
     /// Draws a batch, improves the online network by it and renews its priorities; its loss.
     fn update(&mut self, rng: &mut Rng) -> f64 {
-        let settings = self.policy.settings.clone();
+        let settings = &self.settings;
         let samples = self.replay.sample(settings.batch_len, self.updates, rng);
         let batch: Vec<&Transition> = samples.iter().map(|&(index, _)| self.replay.get(index)).collect();
         let weights: Vec<f32> = samples.iter().map(|&(_, weight)| weight).collect();
         let online = &mut self.policy.network;
-        let (loss, td_errors) = improve(online, &self.target, &mut self.adam, &settings, &batch, &weights);
+        let (loss, td_errors) = improve(online, &self.target, &mut self.adam, settings, &batch, &weights);
         for (&(index, _), td_error) in samples.iter().zip(td_errors) {
             self.replay.update(index, f64::from(td_error));
         }
@@ -123,7 +135,7 @@ impl Agent for Learner {
     }
 
     fn looks_at_mask(&self) -> bool {
-        self.policy.looks_at_mask() || self.policy.settings().choice.masks_target
+        self.policy.looks_at_mask() || self.settings.choice.masks_target
     }
 }
 
@@ -138,7 +150,7 @@ impl Trainable for Learner {
         for transition in transitions(episode, &rewards, &self.policy) {
             self.replay.push(transition);
         }
-        let settings = self.policy.settings();
+        let settings = &self.settings;
         if self.replay.len() < settings.learning_starts {
             return Lesson::default();
         }
