@@ -180,9 +180,11 @@ fn plays(texts: &[&(PathBuf, String)], maps: &BTreeMap<PathBuf, PathBuf>) -> Res
     let ads = recorded(&scenario).map_err(|error| error.to_string())?;
     let stage = Stage::new(&table, &scenario).map_err(|error| error.to_string())?;
     let log = stage.play(&ads, &mut |_, _, _| {});
+    // A scenario of avastra's own may say that nothing happens at first, or at all.
+    let acts_first = scenario.steps.iter().any(|step| step.number == 0 && step.row.is_some());
     match log.steps.first().map(|step| &step.outcome) {
         Some(Outcome::Refused { reason, .. }) => Err(format!("what it places cannot appear: {reason}")),
-        Some(Outcome::Passed) if log.end != End::Arrived => {
+        Some(Outcome::Passed) if acts_first && log.end != End::Arrived => {
             Err("the moment at which its road user appears does not come".to_owned())
         }
         _ => Ok(()),

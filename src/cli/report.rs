@@ -275,9 +275,10 @@ fn of_run(
         results => results.map_err(unread)?,
     };
     let results: Option<Value> = results.and_then(|text| serde_json::from_str(&text).ok());
-    let labels = table.as_ref().map_or(&[][..], ActionTable::rows).iter().map(|row| row.label.as_str());
-    let tests = database.tests(&labels.collect::<Vec<_>>()).map_err(unread)?;
-    let heat = maps(asked, &tests, settings)?;
+    let is_protocol = serde_yaml::from_str::<RunSettings>(settings).is_ok_and(|run| run.rows > 0);
+    let space = table.as_ref().filter(|_| is_protocol).map(|table| &**table.space());
+    let tests = database.tests(space).map_err(unread)?;
+    let heat = maps(asked, &tests, is_protocol)?;
     let (table, results) = (table.as_ref(), results.as_ref());
     found.overview = report::of_run(&database, table, settings, results, &heat).map_err(unread)?;
     let groups = database.groups().map_err(unread)?;
@@ -288,8 +289,7 @@ fn of_run(
 }
 
 /// The heat maps of a run: by the parameters that are asked for, or the main ones of a protocol.
-fn maps(asked: &[String], tests: &[ProtocolTest], settings: &str) -> Result<Vec<HeatMap>, Failure> {
-    let is_protocol = serde_yaml::from_str::<RunSettings>(settings).is_ok_and(|run| run.rows > 0);
+fn maps(asked: &[String], tests: &[ProtocolTest], is_protocol: bool) -> Result<Vec<HeatMap>, Failure> {
     if asked.is_empty() {
         return Ok(if is_protocol { main_maps(tests) } else { Vec::new() });
     }

@@ -150,8 +150,10 @@ fn play_all(
         output.say(&requirements_text(&requirements));
     }
     let is_protocol = run.settings().rows > 0;
-    let labels: Vec<&str> = run.table().rows().iter().map(|row| row.label.as_str()).collect();
-    let tests = if is_protocol { directory.read(|database| database.tests(&labels))? } else { Vec::new() };
+    let tests = match is_protocol {
+        true => directory.read(|database| database.tests(Some(run.space())))?,
+        false => Vec::new(),
+    };
     let tables = match is_protocol && is_over {
         true => protocol::write_both(&directory.path, &run.space().path, &tests)?.to_vec(),
         false => Vec::new(),

@@ -66,10 +66,22 @@ pub fn expect_snapshot(area: &str, stem: &str, text: &str) {
     settings.bind(|| insta::assert_snapshot!(stem, text));
 }
 
+fn is_some_case(wanted: &str) -> bool {
+    let areas = std::fs::read_dir(root().join("tests/cases")).expect("there are cases");
+    let areas = areas.map(|area| area.expect("an area is readable").file_name());
+    areas
+        .filter_map(|area| area.into_string().ok())
+        .any(|area| cases(&area).iter().any(|(stem, _)| stem.contains(wanted)))
+}
+
 /// Tries every case of an area, and names all that fail. With `AVASTRA_CASE` in the environment those whose names hold that.
 #[expect(clippy::disallowed_methods, reason = "who runs the tests says which cases")]
 pub fn try_each(area: &str, try_one: impl Fn(&str, &Path)) {
     let wanted = std::env::var("AVASTRA_CASE").unwrap_or_default();
+    assert!(
+        wanted.is_empty() || is_some_case(&wanted),
+        "no case in tests/cases holds `{wanted}` in its name"
+    );
     let all = cases(area).into_iter().filter(|(stem, _)| stem.contains(&wanted));
     let fails = |(stem, path): &(String, PathBuf)| {
         std::panic::catch_unwind(AssertUnwindSafe(|| try_one(stem, path))).is_err()

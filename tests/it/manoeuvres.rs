@@ -769,6 +769,11 @@ fn random_space(rng: &mut Rng) -> (String, [Guard; 2], Guard) {
                 number(rng, -3.0, 3.0),
                 number(rng, 60.0, 300.0)
             )),
+            3 => fields.push(format!(
+                "keep: {} m, to: {}",
+                number(rng, 1.0, 40.0),
+                ["a", "b"][rng::below(rng, 2) as usize]
+            )),
             _ => {}
         }
         let lane = chance(rng);
@@ -780,7 +785,13 @@ fn random_space(rng: &mut Rng) -> (String, [Guard; 2], Guard) {
             fields.push(format!("offset: {} m", number(rng, -1.5, 1.5)));
         }
         if (lane || offset) && chance(rng) {
-            fields.push(format!("aside: {} m/s", number(rng, 0.2, 4.0)));
+            fields.push(match rng::below(rng, 3) {
+                0 => format!("aside: {} s", number(rng, 0.6, 8.0)),
+                _ => format!("aside: {} m/s", number(rng, 0.2, 4.0)),
+            });
+        }
+        if rng::below(rng, 6) == 0 {
+            fields.push(format!("lights: {}", ["Hazard", "Left", "Off"][rng::below(rng, 3) as usize]));
         }
         if rng::below(rng, 4) == 0 {
             fields.push(
@@ -926,13 +937,14 @@ fn audit(from: u64, spaces: u64, episodes: u32) -> Audited {
                             world.time_s()
                         );
                         let left = Vec2::new(-along.y, along.x);
-                        // One that brakes below 5 m/s during a move to the side slows down sideways as much, too: brakes and
-                        // tyres are bounded one by one.
+                        // One that brakes or gains speed during a move to the side does so along its way, and so sideways
+                        // as well: engine, brakes and tyres are bounded one by one.
                         let slope = (was.velocity_mps.dot(&left) / was.velocity_mps.dot(&along)).abs();
-                        let slowing_mps2 = 1.0 + (-gained_mps2).max(0.0) * slope.min(1.0);
+                        // A change that is broken off is two moves at once, each within the grip (docs/open.md).
+                        let along_way_mps2 = 1.5 + gained_mps2.abs() * slope.min(1.0);
                         let aside_mps2 = ((now.velocity_mps - was.velocity_mps).dot(&left) / DT_S).abs();
                         assert!(
-                            is_hit || !on_lanes || !now.body.is_vehicle() || aside_mps2 <= GRIP_MPS2 + slowing_mps2,
+                            is_hit || !on_lanes || !now.body.is_vehicle() || aside_mps2 <= GRIP_MPS2 + along_way_mps2,
                             "{id} is pushed aside by {aside_mps2} m/s² at {} in {number}/{episode}: {was:?} {now:?}\n{text}",
                             world.time_s()
                         );

@@ -1,21 +1,23 @@
 //! Files as a newcomer writes them, each with a wish. A test for each shows that the wish came true.
 
+use std::cell::Cell;
 use std::collections::BTreeSet;
 
 use avastra::action::{ActionTable, Draw, Effect, Situation};
 use avastra::check::state_argument::memory_from;
 use avastra::emit::{Provenance, unclaimed};
 use avastra::episode::{Choice, Moment, Outcome, Script};
-use avastra::model::vocabulary::{Level, Light, TimeOfDay};
+use avastra::model::vocabulary::{Level, Light, TimeOfDay, Word};
 use avastra::model::{End, Memory, OutcomeFacts, Reach, RulesInForce, Value};
+use avastra::run::Run;
 use avastra::sim::DT_S;
 use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, format, print};
 
-use crate::cases::{cases, root};
+use crate::cases::{cases, expect_snapshot, root, try_each};
 use crate::command::{avastra, done, outcome};
 use crate::examples::example;
-use crate::world::{Wide, assert_replays, read, run_of, space_at};
+use crate::world::{Wide, assert_replays, read, run_against, run_of, space_at};
 
 pub fn wish(name: &str) -> ActionTable {
     ActionTable::new(space_at(&format!("tests/cases/wishes/{name}.ava")))
@@ -77,6 +79,87 @@ fn wishes_compile_as_they_are_written() {
         let messages = |all: &[Diagnostic]| all.iter().map(|found| found.message.clone()).collect::<Vec<_>>();
         assert!(loaded.diagnostics.is_empty(), "{stem}: {:?}", messages(&loaded.diagnostics));
     }
+}
+
+/// For how long a wish is shown from its first row on, s, and how often, s.
+const SHOWN_S: f64 = 36.0;
+const EVERY_S: f64 = 2.0;
+
+/// A space with more rows is another one's, and its wish is about what is drawn.
+const ROWS_SHOWN: usize = 8;
+
+/// Each wish as it happens: its rows, each as soon as it is legal, and where everybody is as each step ends. A new wish is a
+/// file, and what came of it another.
+#[test]
+fn wishes_happen_as_is_written_down() {
+    try_each("wishes", |stem, _| {
+        let table = wish(stem);
+        let rows = table.rows().len();
+        if rows > ROWS_SHOWN {
+            return;
+        }
+        let run = run_against("idm", table.space().clone(), 2, 8, &[]);
+        let played = (0..run.episodes()).map(|episode| shown(&run, episode)).max_by_key(|(acts, _)| *acts);
+        let (acts, text) = played.expect("there is a road");
+        assert!(acts > 0, "no row is legal on any road");
+        expect_snapshot("wishes", stem, &text);
+    });
+}
+
+/// How many rows were carried out in an episode, the scenario that it is, and where everybody was as each step ended.
+fn shown(run: &Run, episode: usize) -> (usize, String) {
+    let (table, space) = (run.table(), run.table().space());
+    let mut open: Vec<usize> = (0..table.rows().len()).collect();
+    let since_s = Cell::new(None);
+    let mut choose = |moment: &Moment| {
+        let now_s = moment.ticks() as f64 * DT_S;
+        if since_s.get().is_some_and(|since_s: f64| now_s - since_s >= SHOWN_S) {
+            return Choice::Stop;
+        }
+        let legal = |row: &usize| table.offer(moment.situation, *row).ok();
+        let Some((nth, draw)) = open.iter().enumerate().find_map(|(nth, row)| Some((nth, legal(row)?)))
+        else {
+            return Choice::Pass;
+        };
+        since_s.set(since_s.get().or(Some(now_s)));
+        open.remove(nth);
+        Choice::Act(draw)
+    };
+    let mut places = String::new();
+    let ticks = (EVERY_S / DT_S).round() as u64;
+    let log = run.play(episode, &mut choose, &mut |world, _, _| {
+        if since_s.get().is_none() || !world.ticks().is_multiple_of(ticks) {
+            return;
+        }
+        let moment = world.moment_facts();
+        let (time_s, front_m, mps) = (world.time_s(), moment.ego_front_m, moment.ego_speed_mps);
+        places += &format!("{time_s:>5.1} s  ego front {front_m:.1} m, {mps:.2} m/s\n");
+        for obstacle in world.obstacles() {
+            let bearer = (0..space.bearers.len()).find(|who| world.bearer_id(*who) == Some(obstacle.id));
+            let name = bearer.map_or(obstacle.body.name(), |who| &space.bearers[who]);
+            let npc = world.npc_facts(obstacle.id).expect("it is there");
+            let (rear_m, front_m, left_m, mps) = (npc.rear_m, npc.front_m, npc.offset_m, npc.speed_mps);
+            places +=
+                &format!("         {name} {rear_m:.1} to {front_m:.1} m, {left_m:.2} m left, {mps:.2} m/s\n");
+        }
+    });
+    assert_replays(run, episode, &log);
+    let acts = log.steps.iter().filter(|step| matches!(step.outcome, Outcome::Done { .. })).count();
+    let space_path = "wish.ava";
+    let source = Provenance {
+        command: "test",
+        name: "wish",
+        space_path,
+        episode: 0,
+        agent: "none",
+        without: &[],
+        with: &[],
+    };
+    let text = print(&unclaimed(table, &log, "As it happens.", &source));
+    // Where the scenario comes from changes with every word of its space.
+    let [from, to] = ["  road: ", "\n}\n"].map(|mark| text.find(mark).expect("it has a road and an end"));
+    let acted: Vec<&str> = text[from..to].lines().filter(|line| !line.ends_with(": wait()")).collect();
+    (acts, format!("{}\n\n{places}", acted.join("\n")))
 }
 
 /// What every step does to a state comes before the judgement of a draw, though the row itself sets nothing.

@@ -321,6 +321,14 @@ impl Path {
         self.project_segments(point, 0, self.points.len() - 1)
     }
 
+    /// How far along the path and to its left a point lies, m. Before its start and beyond its end it goes on straight.
+    pub fn beside(&self, point: Vec2) -> (f64, f64) {
+        let nearest_m = self.project(point).station_m;
+        let (position, along) = self.along(nearest_m);
+        let away = point - position;
+        (nearest_m + along.dot(&away), along.perp(&away))
+    }
+
     /// The nearest point among stations within `reach_m` of `near_m`: quicker, and does not jump
     /// to another branch where the path passes near itself.
     pub fn project_near(&self, point: Vec2, near_m: f64, reach_m: f64) -> Projection {

@@ -1,28 +1,56 @@
-//! What is kept of an episode from tick to tick. The loop asks it only whether somebody has been hit.
+//! What an episode has seen, tick by tick. The loop tells it of every tick and of who appears, and asks it who has been hit; a
+//! step's facts, and in the end the records, come out of it. Nothing here moves the world.
 
 use std::collections::BTreeMap;
 
 use avastra_drivers::Ads;
-use avastra_lang::model::{BodyWord, Memory};
+use avastra_lang::model::{BodyWord, Memory, OutcomeFacts};
+use avastra_world::action::Effect;
 use avastra_world::sim::{Contact, DT_S, Incident, Trace, World};
 
+use super::facts::collision_facts;
 use super::log::{Collision, Held};
-use super::monitor::Monitor;
+use super::monitor::{Breach, Margin, Monitor};
 use super::setup::Setup;
 use super::trails::Trails;
 
-#[derive(Clone)]
-pub(super) struct Chronicle {
+/// How near the ego vehicle is to a collision, and with what.
+#[derive(Clone, Copy)]
+pub(super) struct Near {
+    pub probability: f64,
+    pub body: Option<BodyWord>,
+}
+
+/// What was known as a step began.
+pub(super) struct StepBegins {
+    time_s: f64,
+    collisions: usize,
+}
+
+/// What is left of an episode.
+pub(super) struct Records {
     pub held: Vec<Held>,
-    /// The author's own bodies among the road users, by number.
-    pub own_bodies: BTreeMap<u32, usize>,
     pub collisions: Vec<Collision>,
     pub incidents: Vec<Incident>,
-    trails: Trails,
-    /// `None` where nothing is required.
-    pub monitor: Option<Monitor>,
-    pub trace: Trace,
+    pub breaches: Vec<Breach>,
+    pub margins: Vec<Margin>,
     pub distance_m: f64,
+}
+
+#[derive(Clone)]
+pub(super) struct Chronicle {
+    // What later judgements depend on.
+    /// The author's own bodies among the road users, by number.
+    own_bodies: BTreeMap<u32, usize>,
+    collisions: Vec<Collision>,
+    /// `None` where nothing is required.
+    monitor: Option<Monitor>,
+    trails: Trails,
+    // Records alone.
+    held: Vec<Held>,
+    incidents: Vec<Incident>,
+    trace: Trace,
+    distance_m: f64,
 }
 
 impl Chronicle {
@@ -40,6 +68,42 @@ impl Chronicle {
             trace: Trace::default(),
             distance_m: 0.0,
         }
+    }
+
+    /// An effect has made road users appear, the first of whom has this number.
+    pub fn appeared(&mut self, effect: &Effect, first: u32) {
+        self.own_bodies.extend(effect.own_bodies(first));
+    }
+
+    pub fn begin_step(&self, time_s: f64) -> StepBegins {
+        StepBegins { time_s, collisions: self.collisions.len() }
+    }
+
+    /// The facts of the step that began so, and its smallest margins. Of several collisions in a step, the first decides.
+    pub fn end_step(&mut self, begins: StepBegins, near: Near) -> (OutcomeFacts, &[f64]) {
+        let met = begins.collisions;
+        let facts = match self.collisions.get(met) {
+            Some(first) => collision_facts(first, &self.collisions[..met]),
+            None => OutcomeFacts { proc: near.probability, near: near.body, ..OutcomeFacts::default() },
+        };
+        let breached = self.monitor.as_ref().map_or(0, |monitor| monitor.breached_since(begins.time_s));
+        let margins = self.monitor.as_mut().map_or(&[][..], Monitor::end_step);
+        (OutcomeFacts { breached, ..facts }, margins)
+    }
+
+    pub fn collisions(&self) -> &[Collision] {
+        &self.collisions
+    }
+
+    /// Of every bit of the world up to now.
+    pub fn digest(&self) -> [u8; 32] {
+        self.trace.digest()
+    }
+
+    pub fn into_records(self) -> Records {
+        let Chronicle { held, collisions, incidents, monitor, distance_m, .. } = self;
+        let (breaches, margins) = monitor.map_or_else(Default::default, Monitor::found);
+        Records { held, collisions, incidents, breaches, margins, distance_m }
     }
 
     /// What the driving system answered, before the world moves.

@@ -4,16 +4,14 @@ use std::sync::Arc;
 
 use avastra_drivers::Ads;
 use avastra_lang::model::expr::Expr;
-use avastra_lang::model::{BodyWord, Facts, Memory, OutcomeFacts, Trigger, WorldFacts, evaluate};
+use avastra_lang::model::{Facts, Memory, Trigger, WorldFacts, evaluate};
 use avastra_search::mdp;
 use avastra_search::mdp::{Danger, Observation};
 use avastra_world::action::{Draw, Offer, Refusal, Situation};
 use avastra_world::sim::{Contact, DT_S, Sensed, World};
 
-use super::chronicle::Chronicle;
-use super::facts::collision_facts;
+use super::chronicle::{Chronicle, Near, Records};
 use super::log::{Collision, End, EpisodeLog, Outcome, StepLog};
-use super::monitor::Monitor;
 use super::script::ScriptedAction;
 use super::setup::Setup;
 
@@ -182,13 +180,6 @@ impl Waiting {
     }
 }
 
-/// How near the ego vehicle is to a collision, and with what.
-#[derive(Clone, Copy)]
-struct Near {
-    probability: f64,
-    body: Option<BodyWord>,
-}
-
 /// An episode under way. [`run`] is a loop over [`Play::look`] and [`Play::step`]; a caller that cannot be called back
 /// from a loop uses these two itself. Each call takes the setup that the episode was begun with. A clone is a snapshot,
 /// which can be played on as often as wanted.
@@ -282,7 +273,7 @@ impl Play {
 
     /// The collisions so far.
     pub fn collisions(&self) -> &[Collision] {
-        &self.chronicle.collisions
+        self.chronicle.collisions()
     }
 
     fn situation<'s>(&'s self, setup: &'s Setup) -> Situation<'s> {
@@ -307,7 +298,7 @@ impl Play {
         for (nth, id) in newcomers {
             let effect = &draw.effects[nth];
             spawned.extend(id..id + effect.newcomers());
-            self.chronicle.own_bodies.extend(effect.own_bodies(id));
+            self.chronicle.appeared(effect, id);
         }
         self.memory = draw.memory_after.clone();
         if let Some(happened_s) = self.happened_s.get_mut(setup.table.rows()[draw.row].action) {
@@ -325,24 +316,44 @@ impl Play {
         self.memory = memory;
     }
 
-    /// Drives for one observation period (OTP), or until the goal or the end of the map.
+    /// One observation period (OTP), and its line in the log.
     fn observation_period(
         &mut self,
         setup: &Setup,
         observation: Observation,
-        mut begun: Begun,
+        begun: Begun,
         watch: &mut Watch,
     ) {
         // No space in which every step does something has actions that wait (AV0609).
         if matches!(&begun, Begun::With(Outcome::Passed | Outcome::Refused { .. })) {
             self.wait(setup);
         }
-        let time_s = self.world.time_s();
-        let station_m = self.world.ego_station_m();
+        let (time_s, station_m) = (self.world.time_s(), self.world.ego_station_m());
+        let before = self.chronicle.begin_step(time_s);
+        let (outcome, near) = self.drive(setup, begun, watch);
+        self.count_stalled(self.world.ego_station_m() - station_m);
+        let (facts, margins) = self.chronicle.end_step(before, near);
+        let reward = setup.table.space().reward(facts, &self.memory, margins);
+        let step = StepLog {
+            time_s,
+            state: observation.state,
+            outcome,
+            memory: self.memory.clone(),
+            proc: near.probability,
+            reward,
+            perception: mdp::perception_counts(&self.world, self.ads.status()),
+            trace: self.chronicle.digest(),
+        };
+        self.steps.push(step);
+    }
+
+    /// Drives for one observation period, or until the goal or the end of the map. What became of the step's action, and how
+    /// near a collision was at most.
+    fn drive(&mut self, setup: &Setup, mut begun: Begun, watch: &mut Watch) -> (Outcome, Near) {
         let mut near: Option<Near> = None;
-        let met = self.collisions().len();
+        let episode = &setup.table.space().episode;
         let shift = setup.period_shifts.get(self.steps.len()).copied().unwrap_or(0);
-        let ticks = (setup.table.space().episode.step_s / DT_S).round() as i64 + i64::from(shift);
+        let ticks = (episode.step_s / DT_S).round() as i64 + i64::from(shift);
         for tick in 0..ticks {
             if let Begun::Waiting(waiting) = &mut begun
                 && waiting.is_due(tick, self, setup)
@@ -353,28 +364,15 @@ impl Play {
             if near.is_none_or(|near| now.probability > near.probability) {
                 near = Some(now);
             }
-            let arrived = setup.table.space().episode.stop_arrived && self.world.arrived();
-            if arrived || self.world.left_the_map() {
+            if episode.stop_arrived && self.world.arrived() || self.world.left_the_map() {
                 break;
             }
         }
-        self.count_stalled(self.world.ego_station_m() - station_m);
         let outcome = match begun {
             Begun::With(outcome) => outcome,
             Begun::Waiting(waiting) => waiting.in_vain(),
         };
-        let near = near.unwrap_or(Near { probability: 0.0, body: None });
-        let step = StepLog {
-            time_s,
-            state: observation.state,
-            outcome,
-            memory: self.memory.clone(),
-            proc: near.probability,
-            reward: self.reward(setup, near, met, time_s),
-            perception: mdp::perception_counts(&self.world, self.ads.status()),
-            trace: self.chronicle.trace.digest(),
-        };
-        self.steps.push(step);
+        (outcome, near.unwrap_or(Near { probability: 0.0, body: None }))
     }
 
     /// An ego vehicle that waits for a light does not stall, and its wait does not end a stall. After a contact no wait counts.
@@ -384,19 +382,6 @@ impl Play {
         } else if !self.collisions().is_empty() || !self.world.waits_for_light() {
             self.stalled += 1;
         }
-    }
-
-    /// The reward of the step since `time_s`, before which there had been `met` collisions. Of several in a step, the first
-    /// decides.
-    fn reward(&mut self, setup: &Setup, near: Near, met: usize, time_s: f64) -> f64 {
-        let Chronicle { collisions, monitor, .. } = &mut self.chronicle;
-        let facts = match collisions.get(met) {
-            Some(first) => collision_facts(first, &collisions[..met]),
-            None => OutcomeFacts { proc: near.probability, near: near.body, ..OutcomeFacts::default() },
-        };
-        let breached = monitor.as_ref().map_or(0, |monitor| monitor.breached_since(time_s));
-        let margins = monitor.as_mut().map_or(&[][..], Monitor::end_step);
-        setup.table.space().reward(OutcomeFacts { breached, ..facts }, &self.memory, margins)
     }
 
     /// Judges and carries out an action whose moment has come.
@@ -475,8 +460,8 @@ impl Play {
 
     /// The log of the episode, which ended so.
     pub fn into_log(self, setup: &Setup, end: End) -> EpisodeLog {
-        let Chronicle { held, collisions, incidents, monitor, distance_m, .. } = self.chronicle;
-        let (breaches, margins) = monitor.map_or_else(Default::default, Monitor::found);
+        let Records { held, collisions, incidents, breaches, margins, distance_m } =
+            self.chronicle.into_records();
         EpisodeLog {
             road: setup.road.name.clone(),
             ads: setup.ads.name().to_owned(),

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::run::database::Database;
 use crate::run::sealed::{DatabaseError, query_all};
+use avastra_lang::model::{Row, Space};
 
 /// Below this time to collision or post-encroachment time a drive without a contact is a near miss, s: the threshold of traffic
 /// conflicts (Hydén 1987; the default of FHWA's SSAM, 2008).
@@ -11,6 +12,9 @@ pub const NEAR_S: f64 = 1.5;
 
 /// A contact is mitigated if the ego vehicle was slower by this than before, m/s: 5 km/h, a step of Euro NCAP's speeds.
 pub const MITIGATED_MPS: f64 = 5.0 / 3.6;
+
+/// Why a row counts as not tested, although it may have come.
+const TOUCHED: &str = "the ego vehicle touched somebody before it came";
 
 /// Values of one axis beyond which numbers are put into ranges.
 const AXIS_MAX: usize = 24;
@@ -98,17 +102,18 @@ impl ProtocolTest {
 }
 
 impl Database {
-    /// Every action that was carried out, in order, and the episodes in which none was. `labels` are the rows of the table, to name
-    /// a row that was asked for and refused.
+    /// Every action that was carried out, in order, and the episodes in which none was. `protocol` is the space of a run that
+    /// asked for one row in each episode: then there is one test of each, of that row.
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub fn tests(&self, labels: &[&str]) -> Result<Vec<ProtocolTest>, DatabaseError> {
+    pub fn tests(&self, protocol: Option<&Space>) -> Result<Vec<ProtocolTest>, DatabaseError> {
         let read = &self.connection;
-        let steps = "SELECT episode, step, action, ttc_s, top_speed_mps FROM step ORDER BY episode, step";
+        let steps =
+            "SELECT episode, step, action, ttc_s, top_speed_mps, action_row FROM step ORDER BY episode, step";
         let steps = query_all(read, steps, |row| {
             let (episode, step, action) = (row.get(0)?, row.get(1)?, row.get(2)?);
-            Ok(Step { episode, step, action, ttc_s: row.get(3)?, top_mps: row.get(4)? })
+            Ok(Step { episode, step, action, ttc_s: row.get(3)?, top_mps: row.get(4)?, row: row.get(5)? })
         })?;
         let contacts =
             "SELECT episode, step, ego_speed_mps, relative_speed_mps, counted, precrash, precrash_number
@@ -126,6 +131,8 @@ impl Database {
             ORDER BY episode, steps DESC, text";
         let reasons: Vec<(i64, i64, String)> =
             query_all(read, reasons, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+        let offered = "SELECT DISTINCT episode, action_row FROM offer ORDER BY episode, action_row";
+        let offered: Vec<(i64, i64)> = query_all(read, offered, |row| Ok((row.get(0)?, row.get(1)?)))?;
         let episodes = "SELECT episode, road, pet_s FROM episode ORDER BY episode";
         let episodes: Vec<(i64, String, Option<f64>)> =
             query_all(read, episodes, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
@@ -135,19 +142,29 @@ impl Database {
             let contacts = of_episode(&contacts, episode, |contact| contact.episode);
             let breaches = of_episode(&breaches, episode, |breach| breach.0);
             let mut begun: Vec<usize> = (0..steps.len()).filter(|at| steps[*at].action.is_some()).collect();
-            let asked = if begun.len() == 1 { None } else { self.only_row(episode)? };
-            let asked = asked.and_then(|row| labels.get(row)).map(|label| said(label));
+            let offered = of_episode(&offered, episode, |offer| offer.0);
+            let asked = protocol.and_then(|space| {
+                asked(space, offered.iter().filter_map(|(_, row)| usize::try_from(*row).ok()))
+            });
             // The rows before the one that was asked for make somebody appear.
-            if let Some((name, _)) = &asked {
-                begun.retain(|at| steps[*at].action.as_deref().is_some_and(|action| said(action).0 == *name));
+            begun.retain(|at| asked.is_none_or(|row| steps[*at].row == i64::try_from(row.index).ok()));
+            let of_asked = |reason: &&(i64, i64, String)| {
+                asked.is_none_or(|row| i64::try_from(row.index) == Ok(reason.1))
+            };
+            let refused = of_episode(&reasons, episode, |reason| reason.0).iter().find(of_asked);
+            let mut refused = refused.map(|(_, _, reason)| reason.clone());
+            let first_step = begun.first().map_or(i64::MAX, |at| steps[*at].step);
+            if asked.is_some() && contacts.iter().any(|contact| contact.step < first_step) {
+                refused = Some(TOUCHED.to_owned());
+                begun.clear();
             }
             if begun.is_empty() {
-                let refused = of_episode(&reasons, episode, |reason| reason.0).first();
                 let mut test = ProtocolTest::without_action(episode, &road);
-                test.refused = refused.map(|(_, _, reason)| reason.clone());
-                if let Some((name, values)) = asked.filter(|_| refused.is_some()) {
+                if let Some(row) = asked {
+                    let (name, values) = said(&row.label);
                     (test.action, test.values) = (Some(name), values);
                 }
+                test.refused = refused;
                 tests.push(test);
             }
             for (nth, at) in begun.iter().enumerate() {
@@ -160,14 +177,15 @@ impl Database {
         }
         Ok(tests)
     }
+}
 
-    /// The row that alone was asked for in an episode.
-    fn only_row(&self, episode: i64) -> Result<Option<usize>, DatabaseError> {
-        let query = "SELECT count(DISTINCT action_row), min(action_row) FROM offer WHERE episode = ?";
-        let (rows, row): (i64, Option<i64>) =
-            self.connection.query_row(query, [episode], |row| Ok((row.get(0)?, row.get(1)?)))?;
-        Ok(row.filter(|_| rows == 1).and_then(|row| usize::try_from(row).ok()))
-    }
+/// The row that was asked for, of those that were offered: all others are played before it.
+fn asked(space: &Space, offered: impl Iterator<Item = usize> + Clone) -> Option<&Row> {
+    let is_asked = |row: &&Row| {
+        let before = space.rows_before(row);
+        offered.clone().all(|other| other == row.index || before.contains(&other))
+    };
+    offered.clone().filter_map(|row| space.rows.get(row)).find(is_asked)
 }
 
 /// The rows of an episode among those of all, which are in order.
@@ -256,6 +274,7 @@ struct Step {
     action: Option<String>,
     ttc_s: Option<f64>,
     top_mps: Option<f64>,
+    row: Option<i64>,
 }
 
 /// The name and the values of an action as a run writes it: `name(a: 1, b: Left) with { c: 2 m }`.

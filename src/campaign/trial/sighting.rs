@@ -119,7 +119,7 @@ fn is_off_map(scene: &Scene, before: &Frame, now: &Frame) -> bool {
 fn frame(scene: &Scene, world: &World, id: u32, begin_s: f64) -> Option<Frame> {
     let obstacle = world.obstacle(id)?;
     let pose = obstacle.outline.pose;
-    let beside = scene.route.path.project(pose.position);
+    let (station_m, offset_m) = scene.route.path.beside(pose.position);
     let lane = scene.map.nearest(pose.position, obstacle.lane_heading_rad, LANE_REACH_M).map(|place| {
         let half_width_m = scene.map.lane(place.lane).width_at(place.station_m) / 2.0;
         (place.lane, (place.offset_m.abs() - half_width_m).max(0.0))
@@ -131,9 +131,9 @@ fn frame(scene: &Scene, world: &World, id: u32, begin_s: f64) -> Option<Frame> {
         outline: obstacle.outline,
         velocity_mps: obstacle.velocity_mps,
         gap_m: obstacle.distance_m,
-        route_station_m: beside.station_m,
-        route_offset_m: beside.offset_m,
-        route_heading_rad: scene.route.path.pose_at(beside.station_m).heading_rad,
+        route_station_m: station_m,
+        route_offset_m: offset_m,
+        route_heading_rad: scene.route.path.pose_at(station_m).heading_rad,
         lane,
     })
 }

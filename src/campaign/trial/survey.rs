@@ -52,8 +52,10 @@ pub struct Cell {
     pub row: usize,
     pub label: String,
     pub road: String,
-    /// The row that was carried out before, because this one is about somebody whom it makes appear.
+    /// The rows that were carried out before, because this one is about those whom they make appear.
     pub after: Option<String>,
+    #[serde(skip)]
+    before: Vec<usize>,
     pub outcome: Outcome,
     /// Moments at which it was offered, and those of them at which it was legal.
     pub moments: usize,
@@ -122,41 +124,28 @@ impl<'a> Trials<'a> {
 
     /// The cells of the nth road of the arena, by row.
     fn road(&self, road: usize, judged: &(dyn Fn() + Sync)) -> Vec<Cell> {
-        let alone = self.moments(road, None);
-        let mut later: BTreeMap<usize, Vec<Moment>> = BTreeMap::new();
+        let alone = self.moments(road, &[]);
+        let mut later: BTreeMap<Vec<usize>, Vec<Moment>> = BTreeMap::new();
         let rows = self.arena.table().rows();
         let judge = |row: &Row| {
             let is_legal = |moments: &[Moment]| moments.iter().any(|moment| moment.offers[row.index].is_ok());
             let mut before = None;
             if !is_legal(&alone) {
-                for maker in self.makers(row) {
-                    let after = later.entry(maker).or_insert_with(|| self.moments(road, Some(maker)));
+                for rows in self.arena.table().space().choices_before(row) {
+                    let after = later.entry(rows.clone()).or_insert_with(|| self.moments(road, &rows));
                     if is_legal(after) {
-                        before = Some(maker);
+                        before = Some(rows);
                         break;
                     }
-                    before = before.or((!after.is_empty()).then_some(maker));
+                    before = before.or((!after.is_empty()).then_some(rows));
                 }
             }
-            let moments = before.map_or(&alone, |maker| &later[&maker]);
-            let cell = self.cell(road, row.index, before, moments);
+            let moments = before.as_ref().map_or(&alone, |rows| &later[rows]);
+            let cell = self.cell(road, row.index, before.unwrap_or_default(), moments);
             judged();
             cell
         };
         rows.iter().map(judge).collect()
-    }
-
-    /// The rows that make the first one appear about whom this row is.
-    fn makers(&self, row: &Row) -> Vec<usize> {
-        let space = self.arena.table().space();
-        let about = space.about(row).into_iter().next();
-        about.map_or_else(Vec::new, |who| space.makers(who).map(|row| row.index).collect())
-    }
-
-    /// A row, behind those that make everybody appear about whom it is itself.
-    fn with_makers(&self, row: usize) -> VecDeque<usize> {
-        let space = self.arena.table().space();
-        space.rows_before(&space.rows[row]).into_iter().chain([row]).collect()
     }
 
     /// A try again, as an episode that ends when the judge has seen enough.
@@ -168,9 +157,7 @@ impl<'a> Trials<'a> {
         let action = &space.actions[space.rows[row].action];
         let seen_s = judge::horizon_s(action.manoeuvres().next().is_some());
         let steps = (seen_s / space.episode.step_s).ceil() as usize;
-        let label = |row: &&Row| Some(&row.label) == cell.after.as_ref();
-        let before = space.rows.iter().find(label).map(|row| self.with_makers(row.index));
-        let mut before = before.unwrap_or_default();
+        let mut before = VecDeque::from(cell.before.clone());
         let mut choose = |moment: &episode::Moment| {
             if moment.step >= sample.step + steps {
                 return Choice::Stop;
@@ -183,15 +170,15 @@ impl<'a> Trials<'a> {
         episode::run(&setup, &mut choose)
     }
 
-    /// The moments of undisturbed drives; those after a row was carried out, if one is given.
-    fn moments(&self, road: usize, before: Option<usize>) -> Vec<Moment> {
+    /// The moments of undisturbed drives; those after some rows were carried out, if some are given.
+    fn moments(&self, road: usize, before: &[usize]) -> Vec<Moment> {
         let table = self.arena.table();
         let mut moments = Vec::new();
         for drive in 0..u64::from(self.settings.drives) {
             let seed = rng::child_seed(self.settings.seed, Stream::Episode, drive);
             let setup = self.arena.setup(road, seed);
             let step_ticks = (table.space().episode.step_s / avastra_world::sim::DT_S).round() as u64;
-            let mut open = before.map_or_else(VecDeque::new, |row| self.with_makers(row));
+            let mut open: VecDeque<usize> = before.iter().copied().collect();
             let mut offered = Vec::new();
             let mut snapshots: Vec<(World, Box<dyn Ads>)> = Vec::new();
             let log = episode::run_watched(
@@ -215,7 +202,7 @@ impl<'a> Trials<'a> {
         moments
     }
 
-    fn cell(&self, road: usize, row: usize, before: Option<usize>, moments: &[Moment]) -> Cell {
+    fn cell(&self, road: usize, row: usize, before: Vec<usize>, moments: &[Moment]) -> Cell {
         let legal: Vec<(&Moment, &Draw)> =
             moments.iter().filter_map(|moment| Some((moment, moment.offers[row].as_ref().ok()?))).collect();
         let mut refusals = Vec::new();
@@ -238,11 +225,13 @@ impl<'a> Trials<'a> {
         let realised = samples.iter().filter(|sample| sample.failure.is_none()).count();
         nearest_m.sort_by(f64::total_cmp);
         let table = self.arena.table();
+        let labels = |rows: &[usize]| rows.iter().map(|row| &*table.rows()[*row].label).collect::<Vec<_>>();
         Cell {
             row,
             label: table.rows()[row].label.clone(),
             road: self.arena.road(road).name.clone(),
-            after: before.map(|row| table.rows()[row].label.clone()),
+            after: (!before.is_empty()).then(|| labels(&before).join(" and ")),
+            before,
             outcome: match (tries, realised) {
                 (0, _) => Outcome::Masked,
                 (_, 0) => Outcome::NotRealised,

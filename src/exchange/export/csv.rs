@@ -28,7 +28,7 @@ pub fn csv(recording: &Recording) -> String {
             else {
                 continue;
             };
-            let beside = recording.road.route.path.project(sample.pose.position);
+            let (along_m, left_m) = recording.road.route.path.beside(sample.pose.position);
             let like = if actor.id == 0 { "ego" } else { actor.body.name() };
             let _ = writeln!(
                 text,
@@ -47,8 +47,8 @@ pub fn csv(recording: &Recording) -> String {
                 u8::from(touched(actor.id)),
                 like,
                 recording.names.get(&actor.id).map_or("", String::as_str),
-                number(beside.station_m),
-                number(beside.offset_m),
+                number(along_m),
+                number(left_m),
                 actor.lights_at(tick).name(),
             );
         }

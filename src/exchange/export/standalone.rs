@@ -90,7 +90,7 @@ pub fn standalone(space: &Space, scenario: &Scenario, log: &EpisodeLog) -> Optio
     let lacks = [
         is_bound.then_some("the rules on lane changes of its space"),
         is_directed.then_some("the manoeuvres of its space"),
-        actions.is_moved.then_some("the place beside the ego vehicle at which somebody's way begins"),
+        actions.is_moved.then_some("the place at which somebody begins"),
         is_external.then_some("the driving system, which does not come with avastra"),
     ];
     Some(Standalone { text, lacks: lacks.into_iter().flatten().collect() })
@@ -104,7 +104,7 @@ struct Actions<'a> {
     bodies: BTreeMap<usize, &'a BodyDef>,
     /// The trajectories that they follow, likewise.
     trajectories: BTreeMap<usize, &'a TrajectoryDef>,
-    /// Whether a way that begins beside the ego vehicle begins behind it in the text.
+    /// Whether somebody begins elsewhere in the text: beside the ego vehicle, or behind others at a junction.
     is_moved: bool,
 }
 
@@ -211,6 +211,8 @@ impl<'a> Actions<'a> {
             fields.push(ignored_field(request.ignores));
         }
         fields.push(format!("colour: {}", request.colour.name()));
+        // Nor how far behind the first of a row somebody comes to a junction.
+        self.is_moved |= request.behind_first_m != 0.0;
         let distance = decimal(distance_m, false);
         format!("spawn {body}{name} {place} {distance} m{cover} {{ {} }}", fields.join(", "))
     }

@@ -725,7 +725,6 @@ impl Checker {
         }
     }
 
-    /// The `then` of a spawn: a word, or a manoeuvre.
     /// Reports a `lane` and a `side` that mean nothing to any of the verbs.
     fn check_place_fields(&mut self, fields: &[(SpawnField, &ast::Expr)], verbs: &[Verb]) {
         let [ahead, behind, overtake] = [Verb::DriveAhead, Verb::DriveBehind, Verb::Overtake];
@@ -746,6 +745,7 @@ impl Checker {
         }
     }
 
+    /// The `then` of a spawn: a word, or a manoeuvre.
     fn then(
         &mut self,
         value: &ast::Expr,

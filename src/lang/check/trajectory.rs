@@ -88,7 +88,7 @@ impl Checker {
             _ => false,
         };
         let items = match points.map(|points| (points, &points.kind)) {
-            Some((points, ast::ExprKind::List(items))) if items.iter().any(is_along) => {
+            Some((points, ast::ExprKind::List(items))) if items.is_empty() || items.iter().any(is_along) => {
                 self.places(points, BESIDE_EXAMPLE)?
             }
             _ => {
@@ -100,7 +100,8 @@ impl Checker {
             }
         };
         let points = all_of(items.iter().map(|item| self.point_beside(item)))?;
-        BesideRoute::new(&points).or_else(|| self.has_no_length(block.name.span))
+        let way = BesideRoute::new(&points).filter(|way| way.length_m() >= LENGTH_M_MIN);
+        way.or_else(|| self.has_no_length(block.name.span))
     }
 
     fn on_map(

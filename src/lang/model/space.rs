@@ -689,25 +689,70 @@ impl Space {
         about
     }
 
-    /// The rows that make somebody of a name appear.
+    /// The rows that make somebody of a name appear, first those that do so for sure.
     pub fn makers(&self, bearer: usize) -> impl Iterator<Item = &Row> {
-        let makes =
-            move |row: &&Row| self.actions[row.action].spawns().any(|spawn| spawn.bearer == Some(bearer));
-        self.rows.iter().filter(makes)
+        let which =
+            move |sure: bool| self.rows.iter().filter(move |row| self.makes(row, bearer) == Some(sure));
+        which(true).chain(which(false))
     }
 
-    /// Rows that, one after another, make everybody appear about whom a row is: for each name the first one that does.
+    /// Whether a row makes somebody of a name appear, and if so, whether for sure.
+    fn makes(&self, row: &Row, bearer: usize) -> Option<bool> {
+        let spawn = self.actions[row.action].spawns().find(|spawn| spawn.bearer == Some(bearer))?;
+        Some(self.surely_appears(row, spawn))
+    }
+
+    /// Whether a spawn of a row happens whatever is drawn.
+    fn surely_appears(&self, row: &Row, spawn: &SpawnDef) -> bool {
+        let Some(InRow { nth, count: Some(count), .. }) = &spawn.row else { return true };
+        let least = match count.kind {
+            ExprKind::Number(number) => number.to_f64(),
+            ExprKind::Local(local) => {
+                let name = &self.actions[row.action].parameters[local].name;
+                let axis = row.axes.iter().find(|(axis, _)| axis == name);
+                axis.map_or(0.0, |(_, value)| value.number())
+            }
+            _ => 0.0,
+        };
+        (*nth as f64) < least
+    }
+
+    /// Rows that, one after another, make everybody appear about whom a row is: for each name the first one that does, after
+    /// those that this one needs itself.
     pub fn rows_before(&self, row: &Row) -> Vec<usize> {
-        let (mut before, mut open) = (Vec::new(), vec![row]);
-        while let Some(next) = open.pop() {
-            for maker in self.about(next).into_iter().filter_map(|who| self.makers(who).next()) {
-                if maker.index != row.index && !before.contains(&maker.index) {
-                    before.insert(0, maker.index);
-                    open.push(maker);
-                }
+        let (mut before, mut seen) = (Vec::new(), vec![row.index]);
+        self.add_makers(row, &mut before, &mut seen);
+        before
+    }
+
+    /// All choices of such rows that differ in who makes the first of those road users appear.
+    pub fn choices_before(&self, row: &Row) -> Vec<Vec<usize>> {
+        let first = self.about(row).into_iter().next();
+        let makers = first.into_iter().flat_map(|who| self.makers(who));
+        let with = |maker: &Row| {
+            let (mut before, mut seen) = (Vec::new(), vec![row.index]);
+            self.add_row(maker, &mut before, &mut seen);
+            self.add_makers(row, &mut before, &mut seen);
+            before
+        };
+        makers.map(with).filter(|before| !before.is_empty()).collect()
+    }
+
+    fn add_makers(&self, row: &Row, before: &mut Vec<usize>, seen: &mut Vec<usize>) {
+        for who in self.about(row) {
+            let is_made = |made: &usize| self.makes(&self.rows[*made], who) == Some(true);
+            if !before.iter().any(is_made) {
+                self.makers(who).next().into_iter().for_each(|maker| self.add_row(maker, before, seen));
             }
         }
-        before
+    }
+
+    fn add_row(&self, maker: &Row, before: &mut Vec<usize>, seen: &mut Vec<usize>) {
+        if !seen.contains(&maker.index) {
+            seen.push(maker.index);
+            self.add_makers(maker, before, seen);
+            before.push(maker.index);
+        }
     }
 
     /// All that a step sets, in the order in which it happens: by its action, by `on … also`, and by every step. Without

@@ -77,9 +77,8 @@ pub fn through(points: &[WayPoint]) -> Option<(Path, Vec<(f64, f64)>)> {
     for (nth, point) in points.iter().enumerate() {
         let step_m = nth.checked_sub(1).map_or(0.0, |before| (point.place - places[before]).norm());
         station_m += step_m;
-        if step_m > 0.0 || nth == 0 {
-            turns.push((station_m, point.turned_rad));
-        }
+        // A point that is written twice says how one is turned up to there, and from there on.
+        turns.push((station_m, point.turned_rad));
     }
     turns.retain(|_| points.iter().any(|point| point.turned_rad != 0.0));
     Some((path, turns))
@@ -95,9 +94,9 @@ pub struct BesideRoute {
 /// Two points that are so near to each other are one, m.
 const SAME_M: f64 = 1e-6;
 
-/// How far points of a curve are apart, m, and into how many a piece is cut at least and most.
+/// How far points of a curve are apart, m, and into how many a piece is cut at least.
 const STEP_M: f64 = 0.25;
-const PIECES: core::ops::RangeInclusive<usize> = 8..=200;
+const PIECES_MIN: usize = 8;
 
 impl BesideRoute {
     /// A curve through the points (a centripetal Catmull-Rom spline: Yuksel, Schaefer and Keyser 2009), of a new one behind each
@@ -108,8 +107,13 @@ impl BesideRoute {
         for part in points.chunk_by(|a, b| !is_twice(a, b)) {
             curved.extend(curve(part));
         }
-        let first = curved.first()?;
-        curved.iter().any(|point| !is_twice(first, point)).then_some(BesideRoute { points: curved })
+        let way = BesideRoute { points: curved };
+        (way.length_m() >= SAME_M).then_some(way)
+    }
+
+    /// How long it is beside a straight route, m.
+    pub fn length_m(&self) -> f64 {
+        self.points.windows(2).map(|pair| (pair[1].place - pair[0].place).norm()).sum()
     }
 
     /// Where it lies if it begins at this station of a route. `None` if the bends of that leave nothing of it.
@@ -120,7 +124,14 @@ impl BesideRoute {
         };
         let points: Vec<WayPoint> = self.points.iter().map(beside).collect();
         let (path, turns) = through(&points)?;
-        let heights_m = path.points().iter().map(|point| height_m(route.project(point.position).station_m));
+        // The way has its points in order, without those that are the same as the one before.
+        let mut nth = 0;
+        let heights_m = path.points().iter().map(|at| {
+            while points.get(nth + 1).is_some() && points[nth].place != at.position {
+                nth += 1;
+            }
+            height_m((begins_m + self.points[nth].place.x).clamp(0.0, route.length_m()))
+        });
         let heights_m = heights_m.collect();
         Some(Trajectory { path, heights_m, turns })
     }
@@ -135,7 +146,7 @@ fn curve(points: &[WayPoint]) -> Vec<WayPoint> {
         // Beyond its ends the curve goes on straight.
         let before = nth.checked_sub(1).map_or(from + from - to, |nth| places[nth]);
         let after = places.get(nth + 2).copied().unwrap_or(to + to - from);
-        let pieces = (((to - from).norm() / STEP_M).ceil() as usize).clamp(*PIECES.start(), *PIECES.end());
+        let pieces = (((to - from).norm() / STEP_M).ceil() as usize).max(PIECES_MIN);
         curved.extend((1..=pieces).map(|piece| {
             let part = piece as f64 / pieces as f64;
             let turned_rad = pair[0].turned_rad + (pair[1].turned_rad - pair[0].turned_rad) * part;

@@ -163,7 +163,10 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
     let is_ahead = matches!(distance.low, End::At(low, _) if low >= Rational::ZERO);
     let is_on_route =
         |verb: &Verb| !verb.walks_along() && !matches!(verb, Verb::Walk | Verb::CrossRoad | Verb::Follow);
+    // Those of a row but the first begin farther away than it says.
+    let is_first = spawn.row.as_ref().is_none_or(|row| row.nth == 0);
     if lands
+        && is_first
         && spawn.of.is_none()
         && spawn.offset.is_none()
         && is_ahead

@@ -2,7 +2,7 @@
 
 use crate::mdp::{ProcKind, RewardSettings};
 
-use super::settings::{SettingsError, require, unit, within};
+use super::settings::{Requirement, SettingsError, require, unit, within};
 use super::trajectory::Trajectory;
 
 /// The step and its reward.
@@ -52,7 +52,12 @@ impl PaymentSettings {
             reward("uncounted_reward", self.uncounted_reward),
             reward("safe_reward", self.safe_reward),
         ])?;
-        let period = |period_s| within("observation_period_s", period_s, 0.5..=60.0, "from 0.5 to 60");
+        let period = |period_s: f64| {
+            // In ticks of the simulation it is a whole number, as a space's `step` is.
+            let is_met = (0.5..=60.0).contains(&period_s) && (period_s * 50.0).fract() == 0.0;
+            let wanted = "from 0.5 to 60, a multiple of 0.02";
+            Requirement { name: "observation_period_s", is_met, value: period_s.to_string(), wanted }
+        };
         require(self.observation_period_s.map(period))?;
         if self.pays_maker && (self.delayed_credit || self.reward == RewardSource::Space) {
             let message = "`pays_maker` needs `reward: equation` and `delayed_credit: false`; or say `pays_maker: false`";

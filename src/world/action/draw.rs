@@ -7,17 +7,18 @@ use crate::action::course::Part;
 use crate::action::later::Later;
 use crate::action::table::{Draw, Refusal, Situation};
 use crate::action::{
-    Begins, Course, Effect, LaneChangeRules, LightRequest, OnTrajectory, OrderRequest, SpawnRequest,
+    Begins, Course, Effect, GAP_TO_ITSELF, GAP_TO_NOBODY, LaneChangeRules, LightRequest, OnTrajectory,
+    OrderRequest, SpawnRequest,
 };
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::body::{OwnBody, parameters};
-use avastra_lang::model::command::{IgnoredRules, OFFSET_M, Told};
+use avastra_lang::model::command::{Command, IgnoredRules, OFFSET_M, Told};
 use avastra_lang::model::expr::{Expr, Who};
 use avastra_lang::model::rules::{
     Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,
 };
-use avastra_lang::model::vocabulary::{ShownLights, Verb};
+use avastra_lang::model::vocabulary::{LaneChoice, ShownLights, Verb};
 use avastra_lang::model::{
     ActionDef, BodyWord, Domain, EARLY_S, EffectDef, Facts, LIGHT_AT_M, LightDef, MEET, ManoeuvreCall,
     Memory, MomentFacts, NpcFacts, OrderDef, Parameter, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value,
@@ -187,7 +188,10 @@ impl<'a> Judge<'a> {
                 }
             };
             let is_beside = spawn_defs.next().is_some_and(|spawn| spawn.of.is_some());
-            let least_m = *spawn_distance_m(request.verb).start();
+            let least_m = match request.lane {
+                LaneChoice::Current => spawn_distance_m(request.verb).start().max(0.0),
+                LaneChoice::Left | LaneChoice::Right => *spawn_distance_m(request.verb).start(),
+            };
             if is_beside && (request.distance_m.is_nan() || request.distance_m < least_m) {
                 let why = if request.distance_m.is_nan() { ABSENT } else { PASSED };
                 refusals.push(refuse(None, format!("cannot spawn: {why}")));
@@ -438,15 +442,28 @@ impl<'a> Judge<'a> {
 
     /// Why an order cannot be given after the effects before it. Somebody whom one of them spawns under that name is there.
     fn order_refusal(&self, order: &OrderRequest, before: &[Effect]) -> Option<Refusal> {
-        let spawned = before.iter().rev().find_map(|effect| match effect {
-            Effect::Spawn(request) if request.bearer == Some(order.bearer) => Some(request.verb),
-            Effect::Spawn(_) | Effect::Time(_) | Effect::Sky(..) | Effect::Order(_) | Effect::Light(_) => {
-                None
+        let spawned = |who: usize| {
+            before.iter().rev().find_map(|effect| match effect {
+                Effect::Spawn(request) if request.bearer == Some(who) => Some(request.verb),
+                Effect::Spawn(_)
+                | Effect::Time(_)
+                | Effect::Sky(..)
+                | Effect::Order(_)
+                | Effect::Light(_) => None,
+            })
+        };
+        let is_there = |who: usize| self.bearers.iter().any(|(known, _)| *known == who);
+        // Of the gap to somebody who appears with the order the world knows nothing yet.
+        let to = order.command.to.filter(|to| *to == order.bearer || spawned(*to).is_none());
+        let impossible = || match (spawned(order.bearer), to) {
+            (None, _) => {
+                let command = Command { to, ..order.command };
+                self.situation.surroundings.order_refusal(&OrderRequest { command, ..*order })
             }
-        });
-        let impossible = || match spawned {
-            Some(verb) => order.impossible(verb),
-            None => self.situation.surroundings.order_refusal(order),
+            (Some(verb), to) => order.impossible(verb).or_else(|| match to? {
+                to if to == order.bearer => Some(GAP_TO_ITSELF.to_owned()),
+                to => (!is_there(to)).then(|| GAP_TO_NOBODY.to_owned()),
+            }),
         };
         let name = || &self.row.space.bearers[order.bearer];
         let reason = order

@@ -50,6 +50,10 @@ impl OrderRequest {
     }
 }
 
+/// Why nobody keeps a gap to some, in words that complete "cannot order `NAME`: …".
+pub(crate) const GAP_TO_NOBODY: &str = "nobody is there to whom it is to keep a gap";
+pub(crate) const GAP_TO_ITSELF: &str = "it keeps no gap to itself";
+
 /// A road user that is to appear.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpawnRequest {

@@ -32,6 +32,7 @@ pub use course::Course;
 pub use effect::{
     Begins, Effect, LaneChangeRules, LightRequest, OnTrajectory, OrderRequest, SpawnRequest, Surroundings,
 };
+pub(crate) use effect::{GAP_TO_ITSELF, GAP_TO_NOBODY};
 pub use file::{AxisRecord, DrawRecord, RoadRecord, RowRecord, RuleRecord, TableFile};
 pub use later::LaterMoment;
 pub use table::{ActionTable, Draw, Offer, Refusal, RowOdds, Situation};

@@ -5,7 +5,7 @@ use avastra_base::geometry::Vec2;
 use avastra_lang::model::vocabulary::{Fact, Light, Priority, Turn, WordFact};
 use avastra_lang::model::{
     CROSSWALK_GAP_M_MAX, JUNCTION_AHEAD_M_MAX, LIGHT_AHEAD_M, LightTimes, MomentFacts, NpcFacts, OnRoute,
-    TIME_S_MAX, junction_ahead,
+    SINCE_S_MAX, TIME_S_MAX, junction_ahead,
 };
 
 use super::around::Around;
@@ -181,7 +181,8 @@ impl Around<'_> {
     fn light_times(&self, signal: Option<usize>) -> LightTimes {
         signal.map_or_else(LightTimes::default, |signal| {
             let (since, left) = self.signals.around(&self.scene.map, signal, self.tick);
-            LightTimes { since_s: since as f64 * DT_S, left_s: left as f64 * DT_S }
+            let at_most = |ticks: u64| (ticks as f64 * DT_S).min(SINCE_S_MAX);
+            LightTimes { since_s: at_most(since), left_s: at_most(left) }
         })
     }
 

@@ -138,6 +138,8 @@ pub struct World {
     signals: SignalClock,
     /// What a light was told to show.
     switch: Option<Switch>,
+    /// The clocks of the lights before orders moved them, and up to which tick each counted.
+    signals_until: Vec<(u64, SignalClock)>,
     /// In order of appearance.
     users: Vec<RoadUser>,
     next_id: u32,
@@ -183,6 +185,7 @@ impl World {
             environment,
             signals: SignalClock::new(start.signal_phase_s, scene.lights),
             switch: None,
+            signals_until: Vec::new(),
             users: Vec::with_capacity(COMMANDED_MAX as usize),
             next_id: 1,
             ambient: Ambient::new(start.ambient),
@@ -384,12 +387,13 @@ impl World {
 
     /// Colour of a signal now, by index in `RoadMap::signals`.
     pub fn signal(&self, signal: usize) -> SignalColour {
-        self.signal_at(signal, self.ticks)
+        self.signals.colour(&self.scene.map, signal, self.ticks)
     }
 
-    /// Colour of a signal at a tick.
+    /// Colour of a signal at a tick that is past.
     pub fn signal_at(&self, signal: usize, tick: u64) -> SignalColour {
-        self.signals.colour(&self.scene.map, signal, tick)
+        let then = self.signals_until.iter().find(|(until, _)| tick < *until);
+        then.map_or(&self.signals, |(_, clock)| clock).colour(&self.scene.map, signal, tick)
     }
 
     /// What the sensors see now, in buffers of its own.

@@ -244,6 +244,10 @@ fn beside(view: &View, to: Option<u32>) -> Option<Beside> {
         }
         Some(id) => {
             let other = around.obstacles().find(|other| other.id == id)?;
+            // So has one that comes before it in the world's order.
+            if around.users[0].iter().any(|user| user.obstacle.id == id) {
+                here_m += own_mps * DT_S;
+            }
             let (middle_m, half_m, other_mps) = along_route(other);
             (middle_m + half_m, middle_m - half_m, other_mps)
         }

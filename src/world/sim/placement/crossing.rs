@@ -80,6 +80,9 @@ fn standing(asked: &Asked, conflict: &Conflict) -> Result<Driver, String> {
     if request.early_s.is_some() {
         return Err("who stands is there at no time".into());
     }
+    if request.then == Then::Change {
+        return Err("who stands changes no lane".into());
+    }
     let lanes = lanes_to(around, conflict, BEYOND_LINE_M + request.behind_first_m + size.length_m);
     let mut rng = choices(around.seed, id, 0);
     let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;

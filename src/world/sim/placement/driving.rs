@@ -27,6 +27,9 @@ const RETURN_M: f64 = 20.0;
 pub(super) fn drive_ahead(asked: &Asked) -> Result<Driver, String> {
     let Asked { around, request, id, .. } = *asked;
     let station_m = ahead_m(asked)?;
+    if request.lane == LaneChoice::Current && request.distance_m < 0.0 {
+        return Err("in the ego vehicle's own lane nobody begins beside it".into());
+    }
     let lane = chosen_lane(around, station_m, request.lane)?;
     let mut rng = choices(around.seed, id, 0);
     let beside_ego = around.scene.route.path.pose_at(station_m).position;

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::action::{Draw, Effect, LaterMoment, LightRequest, OrderRequest, SpawnRequest};
+use crate::action::{
+    Draw, Effect, GAP_TO_ITSELF, GAP_TO_NOBODY, LaterMoment, LightRequest, OrderRequest, SpawnRequest,
+};
 use crate::sim::ego::VehicleParameters;
 use crate::sim::moment::npc_facts;
 use crate::sim::npc::View;
@@ -114,8 +116,8 @@ impl World {
             return Err(reason);
         }
         match order.command.to.map(|who| self.bearer_id(who)) {
-            Some(None) => return Err("nobody is there to whom it is to keep a gap".to_owned()),
-            Some(Some(id)) if id == obstacle.id => return Err("it keeps no gap to itself".to_owned()),
+            Some(None) => return Err(GAP_TO_NOBODY.to_owned()),
+            Some(Some(id)) if id == obstacle.id => return Err(GAP_TO_ITSELF.to_owned()),
             Some(Some(_)) | None => {}
         }
         if let Motion::Drive(driver) = &mover.motion {
@@ -179,12 +181,19 @@ impl World {
     /// green one waits with its change.
     pub(super) fn switch_light(&mut self) {
         let Some(Switch { signal, colour, at_m }) = self.switch else { return };
-        let (map, tick) = (&self.scene.map, self.ticks);
-        if VehicleParameters::MKZ.front_m(self.ego_station_m) >= at_m {
+        let (map, tick, before) = (&self.scene.map, self.ticks, self.signals);
+        let from = if VehicleParameters::MKZ.front_m(self.ego_station_m) >= at_m {
             self.signals.jump(map, signal, tick, colour);
             self.switch = None;
+            tick
         } else if self.signals.colour(map, signal, tick) == SignalColour::Green {
             self.signals.stay(map, signal, tick + 1);
+            tick + 1
+        } else {
+            return;
+        };
+        if self.signals != before {
+            self.signals_until.push((from, before));
         }
     }
 
