@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::cases::root;
 use crate::command::{avastra, done, outcome};
 
 /// A file of variations of another tool, which is a space of twelve rows on six roads.
@@ -110,4 +111,41 @@ fn what_plays_each_row_is_neither_trained_nor_estimated() {
         let (status, _, stderr) = outcome(&mut avastra(&asked));
         assert!(status == 1 && stderr.contains(told), "{more:?}: {status} {stderr}");
     }
+}
+
+/// Rows that are about somebody whom others make appear: some of them for sure, one only if a value says so, one at no time.
+const AFTER_OTHERS: &str = "language 1
+use \"REPOSITORY/scenarios/open_roads.ava\"
+enum Lane = Current
+episode { roads: [country] limit: 3 steps }
+action queue(each n: Int in 1 .. 3) {
+  spawn Sedan as [first, second, third] ahead 200 m apart 10 m { does: DriveAhead, lane: Current, speed: 20 m/s, count: n }
+}
+action slows() { order third { speed: 5 m/s } }
+action never() { order second { lane: Left } }
+action wall() { spawn Sedan as wall ahead 5 m { does: DriveAhead, lane: Current, speed: 0 m/s } }
+action goes() { order wall { speed: 9 m/s } }
+";
+
+#[test]
+fn a_row_stands_under_its_own_name_whatever_comes_before_it() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let space = scratch.path().join("after.ava");
+    std::fs::write(&space, AFTER_OTHERS.replace("REPOSITORY", &root().display().to_string()))
+        .expect("written");
+    let (space, out) = (space.display().to_string(), scratch.path().join("run"));
+    let told = out.display().to_string();
+    let arguments =
+        ["run", &space, "--agent", "every-row", "--replays", "0", "--ads", "blind", "--out", &told];
+    done(&arguments);
+    let table = read(&out, "protocol.csv");
+    let of = |action: &str| {
+        let found = table.lines().filter(|line| line.split(',').nth(2) == Some(action));
+        found.collect::<Vec<_>>().join("\n")
+    };
+    assert_eq!(of("queue").lines().count(), 3, "{table}");
+    assert!(of("slows").contains(",hit,"), "behind the queue of three: {table}");
+    assert!(of("never").contains("cannot order `second`"), "{table}");
+    assert!(of("wall").contains("hit"), "{table}");
+    assert!(of("goes").contains("the ego vehicle touched somebody before it came"), "{table}");
 }

@@ -137,6 +137,7 @@ impl Checker {
             self.report(error.help("give it a `set` or a `spawn`, or remove it"));
         }
         self.check_beside(&declared.effects);
+        self.check_lights(&declared.effects);
         let effects: Vec<Option<Vec<EffectDef>>> =
             declared.effects.iter().map(|effect| self.effect(effect, &place)).collect();
         let is_whole = effects.iter().all(Option::is_some);
@@ -150,6 +151,16 @@ impl Checker {
             span: declared.name.span,
         };
         Some((action, is_whole))
+    }
+
+    /// Reports a second order of the light: a light is told one thing at a time.
+    fn check_lights(&mut self, effects: &[ast::Effect]) {
+        let of_light = |effect: &&ast::Effect| matches!(&effect.kind, ast::EffectKind::Order { who, .. } if who.text == LIGHT.0);
+        if let Some(second) = effects.iter().filter(of_light).nth(1) {
+            let error = Diagnostic::error(code::DUPLICATE, "an action tells the light two things");
+            let help = "the later one alone would count; write an action for each";
+            self.report(error.at(second.span, "told again").help(help));
+        }
     }
 
     /// Reports places beside somebody whom the same action makes appear: nobody of that name is there when places are found.
@@ -555,6 +566,14 @@ impl Checker {
             self.check_side(&verb, behind, span);
         }
         self.check_verb(&body, &verb, span);
+        if let Some(lights) = field(&fields, SpawnField::Lights)
+            && let Some(body) = possible(&body).into_iter().find(|body| !body.like.is_vehicle())
+            && possible(&verb).contains(&Verb::Follow)
+        {
+            let message = format!("a `{}` has no lights", self.body_name(body));
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(lights.span, "without effect");
+            self.report(error.help("leave `lights` out"));
+        }
         self.check_fields(&fields, &verb, manoeuvre.as_ref(), span);
         Some(SpawnDef {
             body,

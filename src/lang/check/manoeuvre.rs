@@ -378,6 +378,13 @@ impl Checker {
             let error = error.at(continuous.span, "in an order, whose numbers are drawn");
             return self.reject(error.help("write a manoeuvre with that phase, and order `then: …`"));
         }
+        if let (Some(to), true) = (field(&fields, CommandField::To), bearer.is_some() && command.to == bearer)
+        {
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, "nobody keeps a gap to itself");
+            let help = "name somebody else, or leave `to` out: then the gap is to the ego vehicle";
+            return self
+                .reject(error.at(to.span, format!("this is who is ordered, `{}`", who.text)).help(help));
+        }
         if manoeuvre.is_none() && command == CommandDef::default() {
             // A misspelt field was reported.
             if fields.len() < declared {

@@ -24,6 +24,8 @@ const LENGTH_M_MIN: f64 = 0.1;
 /// Points along the ego vehicle's route lie at most so far before and behind where the way begins, and beside the route, m.
 const ALONG_M: f64 = 1000.0;
 const BESIDE_ROUTE_M: f64 = 100.0;
+/// Wherever such a way begins it is laid anew, so it has at most so many points.
+const POINTS_MAX: usize = 200;
 
 const BESIDE_EXAMPLE: &str = "points: [{ along: 0 m, offset: -3 m }, { along: 15 m, offset: 0 m }]";
 
@@ -99,6 +101,11 @@ impl Checker {
                 )));
             }
         };
+        if let Some(item) = items.get(POINTS_MAX) {
+            let message = format!("a way beside the route has at most {POINTS_MAX} points");
+            let error = Diagnostic::error(code::SETTING, message).at(item.span, "one too many");
+            return self.reject(error.help("leave some out: the way is a curve through its points"));
+        }
         let points = all_of(items.iter().map(|item| self.point_beside(item)))?;
         let way = BesideRoute::new(&points).filter(|way| way.length_m() >= LENGTH_M_MIN);
         way.or_else(|| self.has_no_length(block.name.span))

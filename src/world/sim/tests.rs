@@ -94,8 +94,11 @@ fn impossible_spawns_are_refused() {
     let behind = SpawnRequest { verb: Verb::DriveOpposite, distance_m: -0.1, ..ahead };
     let refusal = world.survey(&behind).expect_err("no such distance");
     assert_eq!(refusal, "the spawn's distance is -0.1 m, possible is 0 .. 1000 m");
-    let inside = SpawnRequest { distance_m: -2.0, ..ahead };
-    assert_eq!(world.survey(&inside).expect_err("no room"), "the ego vehicle is there");
+    for distance_m in [-2.0, -20.0] {
+        let beside = SpawnRequest { distance_m, ..ahead };
+        let refusal = world.survey(&beside).expect_err("the lane is the ego vehicle's own");
+        assert_eq!(refusal, "in the ego vehicle's own lane nobody begins beside it");
+    }
     // Everybody may follow a trajectory, and this road has none.
     let follows = SpawnRequest { verb: Verb::Follow, ..ahead };
     assert_eq!(world.survey(&follows).expect_err("no such way"), "it follows no trajectory");

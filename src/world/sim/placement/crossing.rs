@@ -78,10 +78,12 @@ pub(super) fn cross_road(asked: &Asked) -> Result<Driver, String> {
 fn standing(asked: &Asked, conflict: &Conflict) -> Result<Driver, String> {
     let Asked { around, request, size, id, .. } = *asked;
     if request.early_s.is_some() {
-        return Err("who stands is there at no time".into());
+        return Err(
+            "it stands at its line, so it does not come `early`: leave that out, or give it a speed".into()
+        );
     }
     if request.then == Then::Change {
-        return Err("who stands changes no lane".into());
+        return Err("it stands at its line, and changes no lane: leave `then: Change` out".into());
     }
     let lanes = lanes_to(around, conflict, BEYOND_LINE_M + request.behind_first_m + size.length_m);
     let mut rng = choices(around.seed, id, 0);

@@ -66,6 +66,27 @@ fn a_gap_to_the_ego_vehicle_is_kept_ahead_and_behind() {
 }
 
 #[test]
+fn a_gap_to_another_one_is_the_same_whoever_appears_first() {
+    let [follower, leader] = [0, 1];
+    for order_of_spawns in [[leader, follower], [follower, leader]] {
+        let mut world = driven(&testing::straight(), 10.0, 8.0);
+        let mut ids = [0; 2];
+        for who in order_of_spawns {
+            let ahead_m = if who == leader { 70.0 } else { 40.0 };
+            let appears = request(Verb::DriveAhead, ahead_m, 10.0);
+            ids[who] = spawn(&mut world, SpawnRequest { bearer: Some(who), ..appears }).id;
+        }
+        let command = Command { keep_m: Some(10.0), to: Some(leader), ..Command::default() };
+        order(&mut world, command);
+        drive(&mut world, 10.0, 20.0);
+        let [behind, ahead] = ids.map(|id| there(&world, id).outline);
+        let between_m = ahead.pose.position.x - behind.pose.position.x;
+        let gap_m = between_m - ahead.half_length_m - behind.half_length_m;
+        assert!((gap_m - 10.0).abs() < 0.01, "{order_of_spawns:?}: {gap_m} m");
+    }
+}
+
+#[test]
 fn a_lane_change_that_is_broken_off_early_leads_back_and_no_farther() {
     for (out_mps, after_s, back_mps) in [(1.0, 0.7, 3.0), (0.6, 3.0, 3.0), (2.0, 0.1, 1.0)] {
         let mut world = driven(&testing::straight(), 8.0, 1.0);
