@@ -6,7 +6,7 @@ use std::process::{Child, Stdio};
 use assert_cmd::Command;
 use serde_json::Value;
 
-use crate::cases::{cases, each_case, files, root, texts};
+use crate::cases::{each_case, files, root, texts, try_each};
 use crate::world::FLICKER;
 
 /// `avastra` with arguments, in the repository.
@@ -132,7 +132,7 @@ fn a_run_says_what_it_refused_and_how_much_traffic_there_was() {
 
 #[test]
 fn every_diagnostic_is_also_json() {
-    for (stem, path) in cases("diagnostics") {
+    try_each("diagnostics", |stem, path| {
         let (_, stdout, stderr) =
             outcome(&mut avastra(&["check", "--format", "json", &path.display().to_string()]));
         for line in stderr.lines().chain(stdout.lines()) {
@@ -141,7 +141,7 @@ fn every_diagnostic_is_also_json() {
             });
             assert!(value.is_object(), "{stem}: {line}");
         }
-    }
+    });
 }
 
 #[test]

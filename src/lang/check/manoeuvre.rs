@@ -448,49 +448,29 @@ impl Checker {
         let at = figure(CommandField::At, Dimension::LENGTH);
         let reach = figure(CommandField::Reach, Dimension::LENGTH);
         let steady = figure(CommandField::Steady, Dimension::LENGTH);
-        let keep = match field(fields, CommandField::Keep) {
-            Some(value) => {
-                let help = "write a way or a time: `keep: 20 m`, `keep: 1.5 s`";
-                Some(self.either(value, [LENGTH, DURATION], ("`keep` is a gap", help), place)?)
-            }
-            None => None,
-        };
-        let aside = match field(fields, CommandField::Aside) {
-            Some(value) => {
-                let message = "`aside` is a speed to the side, or how long the move takes";
-                let help = "write `aside: 1.5 m/s`, or `aside: 3 s`";
-                Some(self.either(value, [SPEED, DURATION], (message, help), place)?)
-            }
-            None => None,
-        };
-        let to = match field(fields, CommandField::To) {
-            Some(value) => Some(self.kept(value, place)?),
-            None => None,
-        };
-        let lane = match field(fields, CommandField::Lane) {
-            Some(value) => Some(self.word::<LaneChoice>("lane", value, place)?),
-            None => None,
-        };
-        let ignores = match field(fields, CommandField::Ignores) {
-            Some(value) => Some(self.ignored_rules(value, place)?),
-            None => None,
-        };
-        let siren = match field(fields, CommandField::Siren) {
-            Some(value) => Some(self.typed(value, place, Type::Bool)?),
-            None => None,
-        };
-        let continuous = match field(fields, CommandField::Continuous) {
-            Some(value) => Some(self.typed(value, place, Type::Bool)?),
-            None => None,
-        };
-        let turn = match field(fields, CommandField::Turn) {
-            Some(value) => Some(self.word::<Turning>("turn", value, place)?),
-            None => None,
-        };
-        let lights = match field(fields, CommandField::Lights) {
-            Some(value) => Some(self.word::<ShownLights>("kind of lights", value, place)?),
-            None => None,
-        };
+        let keep = field(fields, CommandField::Keep).map(|value| {
+            let help = "write a way or a time: `keep: 20 m`, `keep: 1.5 s`";
+            self.either(value, [LENGTH, DURATION], ("`keep` is a gap", help), place)
+        });
+        let aside = field(fields, CommandField::Aside).map(|value| {
+            let message = "`aside` is a speed to the side, or how long the move takes";
+            let help = "write `aside: 1.5 m/s`, or `aside: 3 s`";
+            self.either(value, [SPEED, DURATION], (message, help), place)
+        });
+        let to = field(fields, CommandField::To).map(|value| self.kept(value, place));
+        let lane =
+            field(fields, CommandField::Lane).map(|value| self.word::<LaneChoice>("lane", value, place));
+        let ignores = field(fields, CommandField::Ignores).map(|value| self.ignored_rules(value, place));
+        let siren = field(fields, CommandField::Siren).map(|value| self.typed(value, place, Type::Bool));
+        let continuous =
+            field(fields, CommandField::Continuous).map(|value| self.typed(value, place, Type::Bool));
+        let turn = field(fields, CommandField::Turn).map(|value| self.word::<Turning>("turn", value, place));
+        let lights = field(fields, CommandField::Lights)
+            .map(|value| self.word::<ShownLights>("kind of lights", value, place));
+        // All fields are read before one that is wrong leaves the order out.
+        let (keep, aside, to) = (as_written(keep)?, as_written(aside)?, as_written(to)?);
+        let (lane, ignores, siren) = (as_written(lane)?, as_written(ignores)?, as_written(siren)?);
+        let (continuous, turn, lights) = (as_written(continuous)?, as_written(turn)?, as_written(lights)?);
         let says = |wanted: CommandField| field(fields, wanted).is_some();
         let goes_aside = says(CommandField::Lane) || says(CommandField::Offset);
         let (keeps, is_early) = (says(CommandField::Keep), says(CommandField::Early));

@@ -119,14 +119,10 @@ impl Checker {
         if let Some((who, fact)) = facts[0].or(facts[1]) {
             let word = if facts[0].is_some() { right } else { left };
             if op.orders() {
-                let words = fact.words();
-                let help = format!(
-                    "write `{0} == {1}`, or `{0} in [{1}, {2}]`",
-                    fact.name(),
-                    words[0].0,
-                    words[1].0
-                );
-                return self.unordered(&format!("`{}` has no order", fact.name()), op, span, &help);
+                let (words, name) = (fact.words(), self.as_asked(who, fact, place));
+                let help =
+                    format!("write `{name} == {0}`, or `{name} in [{0}, {1}]`", words[0].0, words[1].0);
+                return self.unordered(&format!("`{name}` has no order"), op, span, &help);
             }
             return Some(equal_or_not(
                 op,
@@ -252,6 +248,17 @@ impl Checker {
         Some(Expr { kind: ExprKind::OnRoad(roads), ty: Type::Bool, span })
     }
 
+    /// A fact as the author asks for it: `ego.light`, `bus.light`.
+    fn as_asked(&self, who: Option<Who>, fact: WordFact, place: &Place<'_>) -> String {
+        let name = match who {
+            None => return fact.name().to_owned(),
+            Some(Who::Named(bearer)) => &self.bearers[bearer],
+            Some(Who::Given(local)) => &place.locals[local].0,
+        };
+        let (_, part) = fact.name().split_once('.').expect("a fact about a road user has two parts");
+        format!("{name}.{part}")
+    }
+
     /// `priority == ego`, `ego.light in [Yellow, Red]`: whether the fact is one of these words.
     fn is_word(
         &mut self,
@@ -266,7 +273,8 @@ impl Checker {
             None => place.site.knows(fact.known()),
         };
         if !knows {
-            let error = Diagnostic::error(code::NOT_HERE, format!("`{}` is not known here", fact.name()));
+            let name = self.as_asked(who, fact, place);
+            let error = Diagnostic::error(code::NOT_HERE, format!("`{name}` is not known here"));
             let who = match fact.known() {
                 Known::Road | Known::World | Known::Spawn => format!("{SEEN_BY} the moment"),
                 Known::Tick | Known::Near => {

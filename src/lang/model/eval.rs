@@ -359,8 +359,7 @@ fn bearer(who: usize, facts: &Facts<'_>) -> Option<NpcFacts> {
     bearers.find(|(known, _)| *known == who).map(|(_, npc)| *npc)
 }
 
-/// The facts, as of a newcomer that is this road user, which may be there.
-/// The same facts, about this road user.
+/// The same facts, with this road user, if it is there, as the newcomer.
 pub(crate) fn about<'a>(npc: Option<NpcFacts>, facts: &Facts<'a>) -> Facts<'a> {
     Facts { spawn: npc.map(|npc| SpawnFacts { npc, ..SpawnFacts::default() }), ..*facts }
 }

@@ -1,10 +1,9 @@
 //! What drivers are told to do beside another one: to keep a gap to the ego vehicle or to a road user, ahead of it or behind it,
-//! or to be at a place so much before the ego vehicle. Both say the speed, from tick to tick, as OpenSCENARIO's continuous `LongitudinalDistanceAction` and its
-//! `SynchronizeAction` do. Lights, bends and others may still make a vehicle slower.
+//! or to be at a place so much before the ego vehicle. Both say the speed, from tick to tick, as OpenSCENARIO's continuous
+//! `LongitudinalDistanceAction` and its `SynchronizeAction` do. Lights, bends and others may still make a vehicle slower.
 
 use avastra_base::kinematics::{braking_m, needed_mps2};
 use avastra_lang::model::command::Command;
-
 use avastra_road::LaneIndex;
 
 use crate::sim::around::{Around, Other};

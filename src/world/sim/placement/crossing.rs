@@ -1,5 +1,5 @@
 //! Crossing traffic: a rendezvous with the ego vehicle at a conflict of its route, on a leg whose signal will
-//! be green.
+//! be green; or somebody who stands at the line of such a leg.
 
 use avastra_lang::model::vocabulary::{Side, Then, TrafficRule};
 use avastra_road::{Conflict, LaneIndex, StopLine};

@@ -1,7 +1,7 @@
 //! Where a spawn puts its road user, and whether there is room.
 //!
-//! `distance_m` is always the gap between the outlines along the ego vehicle's route. What lies at
-//! that distance is each verb's business; the waiting times are those of the published package (its
+//! `distance_m` is the gap between the outlines along the ego vehicle's route, but for `Follow`, for which it is a station of
+//! the trajectory. What lies at that distance is each verb's business; the waiting times are those of the published package (its
 //! offsets are not: they ignore the lanes). A pedestrian who walks begins at a kerb, at most 10 m from the asked
 //! place (`on_foot`). Traffic drives on the right.
 
