@@ -841,7 +841,8 @@ fn random_space(rng: &mut Rng) -> (String, [Guard; 2], Guard) {
         number(rng, 0.5, 2.0)
     );
     text += "action again(each who: RoadUser in [a]) { order who { then: two() } }\n";
-    text += &format!("action tell() {{ order a {{ {} }} }}\n", fields(rng));
+    // An order of a gap to itself does not compile.
+    text += &format!("action tell() {{ order a {{ {} }} }}\n", fields(rng).replace("to: a", "to: b"));
     let guards = [Guard::of("npc", rng), Guard::of("npc", rng)];
     let of_orders = Guard::of("a", rng);
     text += &format!("rule g1 during one: {}\nrule g2 during two: {}\n", guards[0].text, guards[1].text);
@@ -940,8 +941,8 @@ fn audit(from: u64, spaces: u64, episodes: u32) -> Audited {
                         // One that brakes or gains speed during a move to the side does so along its way, and so sideways
                         // as well: engine, brakes and tyres are bounded one by one.
                         let slope = (was.velocity_mps.dot(&left) / was.velocity_mps.dot(&along)).abs();
-                        // A change that is broken off is two moves at once, each within the grip (docs/open.md).
-                        let along_way_mps2 = 1.5 + gained_mps2.abs() * slope.min(1.0);
+                        // A change that is broken off, and the move back, need a tenth more.
+                        let along_way_mps2 = 1.0 + gained_mps2.abs() * slope.min(1.0);
                         let aside_mps2 = ((now.velocity_mps - was.velocity_mps).dot(&left) / DT_S).abs();
                         assert!(
                             is_hit || !on_lanes || !now.body.is_vehicle() || aside_mps2 <= GRIP_MPS2 + along_way_mps2,

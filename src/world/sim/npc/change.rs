@@ -35,6 +35,12 @@ const SPHERE_PART: f64 = 0.75;
 const SPHERE_M_MAX: f64 = 1.2;
 /// Below this speed a lane change slows down with the vehicle, which cannot slide sideways, m/s.
 const CHANGE_FULL_MPS: f64 = 5.0;
+/// Of a change at the limit of the grip that is broken off, the move back may need so much more. Ours.
+const GRIP_MORE: f64 = 1.1;
+/// It takes at most so much longer than it would by itself.
+const LED_BACK_MAX: f64 = 8.0;
+/// Places at which the two are looked at together.
+const BENDS: u32 = 50;
 /// Headway to another vehicle that changes into the same lane, s. Ours.
 const MERGE_S: f64 = 1.0;
 /// Neighbouring lanes whose centres are farther apart than this have parted, m.
@@ -85,6 +91,27 @@ pub(super) struct BrokenOff {
     /// From where it was broken off; above 1 it is over.
     pub progress: f64,
     pub duration_s: f64,
+}
+
+impl BrokenOff {
+    /// How long the move back takes that takes back a change of `over_m` to the side, s: `least_s`, or as much longer as the two
+    /// together need to keep within the grip, but for [`GRIP_MORE`].
+    fn led_back_s(self, over_m: f64, least_s: f64, grip_mps2: f64) -> f64 {
+        let most_mps2 = |back_s: f64| {
+            let at = |nth: u32| {
+                let part = f64::from(nth) / f64::from(BENDS);
+                let left = smooth_step(self.progress + part * back_s / self.duration_s).bend;
+                let back = smooth_step(part).bend;
+                over_m * (back / (back_s * back_s) - left / (self.duration_s * self.duration_s)).abs()
+            };
+            (0..=BENDS).map(at).fold(0.0, f64::max)
+        };
+        let mut back_s = least_s;
+        while most_mps2(back_s) > GRIP_MORE * grip_mps2 && back_s < LED_BACK_MAX * least_s {
+            back_s *= 1.1;
+        }
+        back_s
+    }
 }
 
 /// Whose wish a move to the side is.
@@ -213,8 +240,11 @@ impl Driver {
         let (left, left_m, aside_m) = (Arc::clone(&self.way), self.station_m, self.aside_m());
         let over = to.path.position_at(to_station_m) - left.path.position_at(left_m);
         let back_s = duration_s(over.norm(), self.speed_mps, Whose::Told(told), around);
+        let broken_off = BrokenOff { progress, duration_s: took_s };
         // Quicker than what is left of the first change it would lead beyond the middle of the lane.
-        let duration_s = back_s.max(took_s * (1.0 - progress));
+        let least_s = back_s.max(took_s * (1.0 - progress));
+        let grip_mps2 = around.grip.friction(self.speed_mps) * GRAVITY_MPS2;
+        let duration_s = broken_off.led_back_s(over.norm(), least_s, grip_mps2);
         self.comes_into(to, to_station_m, ends_m);
         self.last_change = self.last_change.map(|side| match side {
             Side::Left => Side::Right,
@@ -226,7 +256,7 @@ impl Driver {
             progress: 0.0,
             duration_s,
             ends_m: aside_m,
-            broken_off: Some(BrokenOff { progress, duration_s: took_s }),
+            broken_off: Some(broken_off),
         });
     }
 
