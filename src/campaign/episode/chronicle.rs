@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use avastra_drivers::Ads;
 use avastra_lang::model::{BodyWord, Memory, OutcomeFacts};
 use avastra_world::action::Effect;
-use avastra_world::sim::{Contact, DT_S, Incident, Trace, World};
+use avastra_world::sim::{Contact, DT_S, Incident, Obstacle, Trace, World};
 
 use super::facts::collision_facts;
 use super::log::{Collision, Held};
@@ -133,8 +133,11 @@ impl Chronicle {
     }
 
     pub fn body(&self, world: &World, id: u32) -> Option<BodyWord> {
-        let own = self.own_bodies.get(&id).copied();
-        world.obstacle(id).map(|obstacle| BodyWord { like: obstacle.body, own })
+        world.obstacle(id).map(|obstacle| self.body_of(obstacle))
+    }
+
+    fn body_of(&self, obstacle: &Obstacle) -> BodyWord {
+        BodyWord { like: obstacle.body, own: self.own_bodies.get(&obstacle.id).copied() }
     }
 
     fn collision(&self, world: &World, contact: Contact, step: usize) -> Collision {
@@ -148,7 +151,7 @@ impl Chronicle {
             shape,
             kind,
             step,
-            body: BodyWord { like: obstacle.body, own: self.own_bodies.get(&id).copied() },
+            body: self.body_of(obstacle),
             mass_t: world.body(id).map_or(0.0, |body| body.mass_t),
             verb: obstacle.verb,
             spawned_s: obstacle.spawned_tick as f64 * DT_S,

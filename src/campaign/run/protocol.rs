@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::run::database::Database;
 use crate::run::sealed::{DatabaseError, query_all};
-use avastra_lang::model::{Row, Space};
+use avastra_lang::model::Space;
 
 /// Below this time to collision or post-encroachment time a drive without a contact is a near miss, s: the threshold of traffic
 /// conflicts (Hydén 1987; the default of FHWA's SSAM, 2008).
@@ -143,9 +143,9 @@ impl Database {
             let breaches = of_episode(&breaches, episode, |breach| breach.0);
             let mut begun: Vec<usize> = (0..steps.len()).filter(|at| steps[*at].action.is_some()).collect();
             let offered = of_episode(&offered, episode, |offer| offer.0);
-            let asked = protocol.and_then(|space| {
-                asked(space, offered.iter().filter_map(|(_, row)| usize::try_from(*row).ok()))
-            });
+            // Of what is played in such an episode its own row alone is noted as offered.
+            let own = offered.first().and_then(|(_, row)| usize::try_from(*row).ok());
+            let asked = protocol.and_then(|space| space.rows.get(own?));
             // The rows before the one that was asked for make somebody appear.
             begun.retain(|at| asked.is_none_or(|row| steps[*at].row == i64::try_from(row.index).ok()));
             let of_asked = |reason: &&(i64, i64, String)| {
@@ -177,15 +177,6 @@ impl Database {
         }
         Ok(tests)
     }
-}
-
-/// The row that was asked for, of those that were offered: all others are played before it.
-fn asked(space: &Space, offered: impl Iterator<Item = usize> + Clone) -> Option<&Row> {
-    let is_asked = |row: &&Row| {
-        let before = space.rows_before(row);
-        offered.clone().all(|other| other == row.index || before.contains(&other))
-    };
-    offered.clone().filter_map(|row| space.rows.get(row)).find(is_asked)
 }
 
 /// The rows of an episode among those of all, which are in order.

@@ -137,7 +137,7 @@ impl Checker {
             self.report(error.help("give it a `set` or a `spawn`, or remove it"));
         }
         self.check_beside(&declared.effects);
-        self.check_lights(&declared.effects);
+        self.check_light_orders(&declared.effects);
         let effects: Vec<Option<Vec<EffectDef>>> =
             declared.effects.iter().map(|effect| self.effect(effect, &place)).collect();
         let is_whole = effects.iter().all(Option::is_some);
@@ -154,7 +154,7 @@ impl Checker {
     }
 
     /// Reports a second order of the light: a light is told one thing at a time.
-    fn check_lights(&mut self, effects: &[ast::Effect]) {
+    fn check_light_orders(&mut self, effects: &[ast::Effect]) {
         let of_light = |effect: &&ast::Effect| matches!(&effect.kind, ast::EffectKind::Order { who, .. } if who.text == LIGHT.0);
         if let Some(second) = effects.iter().filter(of_light).nth(1) {
             let error = Diagnostic::error(code::DUPLICATE, "an action tells the light two things");

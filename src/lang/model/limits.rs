@@ -4,12 +4,11 @@
 
 use core::ops::RangeInclusive;
 
-use crate::model::vocabulary::Verb;
-
 use crate::model::command::OFFSET_M;
 use crate::model::eval::compare;
 use crate::model::expr::Comparison;
 use crate::model::value::Value;
+use crate::model::vocabulary::Verb;
 
 /// The tick of physics, ms: an observation period is a whole number of ticks.
 pub const TICK_MS: u32 = 20;

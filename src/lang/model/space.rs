@@ -224,6 +224,11 @@ impl ActionDef {
         })
     }
 
+    /// The spawn of who bears a name.
+    pub(crate) fn spawn_of(&self, bearer: usize) -> Option<&SpawnDef> {
+        self.spawns().find(|spawn| spawn.bearer == Some(bearer))
+    }
+
     /// The manoeuvres that it gives to road users, in the order of its effects.
     pub fn manoeuvres(&self) -> impl Iterator<Item = usize> {
         let calls = self.effects.iter().filter_map(|effect| match effect {
@@ -443,7 +448,7 @@ pub struct ManoeuvreCall {
 /// The place of a road user in a row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InRow {
-    /// Behind so many others; the first one, at 0, is nearest to the ego vehicle.
+    /// Behind so many others, at least one: the first, nearest to the ego vehicle, is where its spawn says.
     pub nth: usize,
     /// The gap between them, m.
     pub apart: Expr,
@@ -669,8 +674,8 @@ impl RoadFacts {
 }
 
 impl Space {
-    /// The names of the road users about whom a row is, by whom it is ordered or beside whom somebody appears, or about whom its
-    /// rules ask, and whom it does not make appear itself.
+    /// The names of the road users about whom a row is: whom it orders, to whom a gap is kept, beside whom somebody appears, or
+    /// about whom its rules ask, and whom it does not make appear itself.
     pub fn about(&self, row: &Row) -> Vec<usize> {
         let action = &self.actions[row.action];
         let named = action.effects.iter().flat_map(|effect| match effect {
@@ -682,7 +687,7 @@ impl Space {
         let asked = self.clauses[row.action].iter().flat_map(|clause| clause.bearers.iter().copied());
         let mut about = Vec::new();
         for who in named.chain(asked) {
-            if !about.contains(&who) && !action.spawns().any(|spawn| spawn.bearer == Some(who)) {
+            if !about.contains(&who) && action.spawn_of(who).is_none() {
                 about.push(who);
             }
         }
@@ -698,7 +703,7 @@ impl Space {
 
     /// Whether a row makes somebody of a name appear, and if so, whether for sure.
     fn makes(&self, row: &Row, bearer: usize) -> Option<bool> {
-        let spawn = self.actions[row.action].spawns().find(|spawn| spawn.bearer == Some(bearer))?;
+        let spawn = self.actions[row.action].spawn_of(bearer)?;
         Some(self.surely_appears(row, spawn))
     }
 

@@ -80,7 +80,9 @@ pub fn through(points: &[WayPoint]) -> Option<(Path, Vec<(f64, f64)>)> {
         // A point that is written twice says how one is turned up to there, and from there on.
         turns.push((station_m, point.turned_rad));
     }
-    turns.retain(|_| points.iter().any(|point| point.turned_rad != 0.0));
+    if points.iter().all(|point| point.turned_rad == 0.0) {
+        turns.clear();
+    }
     Some((path, turns))
 }
 

@@ -164,9 +164,8 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
     let is_on_route =
         |verb: &Verb| !verb.walks_along() && !matches!(verb, Verb::Walk | Verb::CrossRoad | Verb::Follow);
     // Those of a row but the first begin farther away than it says.
-    let is_first = spawn.row.as_ref().is_none_or(|row| row.nth == 0);
     if lands
-        && is_first
+        && spawn.row.is_none()
         && spawn.of.is_none()
         && spawn.offset.is_none()
         && is_ahead

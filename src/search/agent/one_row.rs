@@ -32,7 +32,7 @@ impl Agent for OneRow {
     fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
         let chosen = self.open.iter().position(|row| legal[*row])?;
         let row = self.open.remove(chosen);
-        if chosen == 0 && row == self.rows[0] {
+        if row == self.rows[0] {
             self.open.clear();
         }
         Some(row)

@@ -1,6 +1,7 @@
 //! What a step of an episode pays the learner.
 
 use crate::mdp::{ProcKind, RewardSettings};
+use avastra_lang::model::TICK_MS;
 
 use super::settings::{Requirement, SettingsError, require, unit, within};
 use super::trajectory::Trajectory;
@@ -53,8 +54,9 @@ impl PaymentSettings {
             reward("safe_reward", self.safe_reward),
         ])?;
         let period = |period_s: f64| {
-            // In ticks of the simulation it is a whole number, as a space's `step` is.
-            let is_met = (0.5..=60.0).contains(&period_s) && (period_s * 50.0).fract() == 0.0;
+            // In ticks of the simulation it is a whole number, as a space's `step` is, but for rounding.
+            let ticks = period_s * 1000.0 / TICK_MS as f64;
+            let is_met = (0.5..=60.0).contains(&period_s) && (ticks - ticks.round()).abs() < 1e-9;
             let wanted = "from 0.5 to 60, a multiple of 0.02";
             Requirement { name: "observation_period_s", is_met, value: period_s.to_string(), wanted }
         };
@@ -94,5 +96,23 @@ impl PaymentSettings {
             rewards[maker] = self.collision_reward;
         }
         rewards
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::agent::presets::paper;
+
+    #[test]
+    fn an_observation_period_is_a_number_of_ticks() {
+        let with = |period_s| PaymentSettings { observation_period_s: Some(period_s), ..paper().payment };
+        // As binary fractions the first three are no exact multiples.
+        for period_s in [0.58, 2.3, 1.14, 0.5, 6.0, 60.0] {
+            assert!(with(period_s).check().is_ok(), "{period_s}");
+        }
+        for period_s in [0.57, 2.301, 0.48, 60.02, f64::NAN] {
+            assert!(with(period_s).check().is_err(), "{period_s}");
+        }
     }
 }

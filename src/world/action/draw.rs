@@ -332,12 +332,8 @@ impl<'a> Judge<'a> {
         verb: Verb,
         locals: &[Value],
     ) -> f64 {
-        let who = of.bearer(locals);
-        let Some((_, npc)) = self.bearers.iter().find(|(known, _)| *known == who) else { return f64::NAN };
-        let rear_m = match spawn.behind {
-            true => npc.rear_m - distance_m - length_m,
-            false => npc.front_m + distance_m,
-        };
+        let near_m = self.near_m(of, spawn.behind, distance_m, locals);
+        let rear_m = if spawn.behind { near_m - length_m } else { near_m };
         match verb.begins_behind() {
             true => self.moment.ego_rear_m - rear_m - length_m,
             false => rear_m - self.moment.ego_front_m,
@@ -352,13 +348,14 @@ impl<'a> Judge<'a> {
                 false => Begins::BeforeFront(distance_m),
             };
         };
+        Begins::BeforeFront(self.near_m(of, spawn.behind, distance_m, locals) - self.moment.ego_front_m)
+    }
+
+    /// The station of the ego vehicle's route so far ahead of somebody's front, or behind its rear, m; NaN while nobody is there.
+    fn near_m(&self, of: Who, behind: bool, distance_m: f64, locals: &[Value]) -> f64 {
         let who = of.bearer(locals);
-        let known = self.bearers.iter().find(|(known, _)| *known == who);
-        let place_m = |npc: &NpcFacts| match spawn.behind {
-            true => npc.rear_m - distance_m,
-            false => npc.front_m + distance_m,
-        };
-        Begins::BeforeFront(known.map_or(f64::NAN, |(_, npc)| place_m(npc)) - self.moment.ego_front_m)
+        let Some((_, npc)) = self.bearers.iter().find(|(known, _)| *known == who) else { return f64::NAN };
+        if behind { npc.rear_m - distance_m } else { npc.front_m + distance_m }
     }
 
     fn request(&self, spawn: &SpawnDef, locals: &[Value], after: &Memory) -> SpawnRequest {

@@ -396,7 +396,8 @@ impl Motion {
         }
     }
 
-    /// From now on it does what it is told, as soon as it can. `to` is the id of the road user to which the command says to keep a gap, if it names one.
+    /// From now on it does what it is told, as soon as it can. `to` is the id of the road user to whom the command says to keep
+    /// a gap, if it names one.
     pub fn order(&mut self, command: &Command, to: Option<u32>, tick: u64) {
         match self {
             Motion::Drive(driver) => driver.order(command, to),

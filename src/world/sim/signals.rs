@@ -3,8 +3,8 @@
 //! A group is green for 12 s and yellow for 3 s, then all are red for 2 s and the next group follows
 //! (yellow 3 to 4 s and all-red 1 to 2 s are usual in towns; the green is ours). Where so many groups
 //! follow each other that the cycle would last longer than two minutes, the greens are shorter, down to
-//! 5 s. A road may say other times. Counted in ticks, so that the colour of any moment is exact. No vehicle detection, no pedestrian
-//! lights.
+//! 5 s. A road may say other times. Counted in ticks, so that the colour of any moment is exact. No vehicle
+//! detection, no pedestrian lights.
 
 use avastra_lang::model::LightProgram;
 use avastra_lang::model::vocabulary::LightColour;

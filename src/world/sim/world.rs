@@ -138,8 +138,6 @@ pub struct World {
     signals: SignalClock,
     /// What a light was told to show.
     switch: Option<Switch>,
-    /// The clocks of the lights before orders moved them, and up to which tick each counted.
-    signals_until: Vec<(u64, SignalClock)>,
     /// In order of appearance.
     users: Vec<RoadUser>,
     next_id: u32,
@@ -153,6 +151,9 @@ pub struct World {
     // What the last tick has to tell. No later tick reads it.
     contacts: Vec<Contact>,
     incidents: Vec<Incident>,
+    /// The clocks of the lights before orders moved them, and up to which tick each counted: what was shown in the past. No tick
+    /// reads it, either.
+    signals_until: Vec<(u64, SignalClock)>,
 }
 
 /// The ego vehicle in a tick, before any contact.

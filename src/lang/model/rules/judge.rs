@@ -303,11 +303,7 @@ impl<'a> RowRules<'a> {
                 .map(|who| who.bearer(candidate.values))
                 .find(|who| !is_there(who));
             let why = match absent {
-                Some(who)
-                    if self.space.actions[self.row.action]
-                        .spawns()
-                        .any(|spawn| spawn.bearer == Some(who)) =>
-                {
+                Some(who) if self.space.actions[self.row.action].spawn_of(who).is_some() => {
                     format!(
                         "no earlier `{}` is there (the one that appears is `npc`)",
                         self.space.bearers[who]

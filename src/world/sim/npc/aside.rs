@@ -29,7 +29,7 @@ pub(super) struct Aside {
     /// m to the left of the middle of its lane.
     wanted_m: f64,
     now_m: f64,
-    /// Greatest speed on the way there, m/s; without it as in lane changes of its own.
+    /// How it goes there; without it as in lane changes of its own.
     told: Option<AsideBy>,
     shift: Option<Shift>,
 }

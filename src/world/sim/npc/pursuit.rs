@@ -223,16 +223,16 @@ fn ways_to(view: &View, station_m: f64) -> (f64, f64) {
 /// Where the road user of that id, or the ego vehicle, is; `None` if that one is not there any more.
 fn beside(view: &View, to: Option<u32>) -> Option<Beside> {
     let View { this, around, .. } = *view;
-    // Two that come towards the ego vehicle count the other way.
-    let (_, _, along) = around.beside_route(this.outline.pose.position);
-    let sign = if to.is_some() && along.dot(&this.forward) < 0.0 { -1.0 } else { 1.0 };
-    // The middle, half the length, and the speed.
+    // The middle, half the length, the speed, and the unit vector along the route.
     let along_route = |one: &Obstacle| {
         let (middle_m, _, along) = around.beside_route(one.outline.pose.position);
         let half_length_m = one.outline.half_extent_m(one.forward, along).0;
-        (sign * middle_m, half_length_m, sign * along.dot(&one.velocity_mps))
+        (middle_m, half_length_m, along.dot(&one.velocity_mps), along)
     };
-    let (mut here_m, half_length_m, own_mps) = along_route(this);
+    let (here_m, half_length_m, own_mps, along) = along_route(this);
+    // Two that come towards the ego vehicle count the other way.
+    let sign = if to.is_some() && along.dot(&this.forward) < 0.0 { -1.0 } else { 1.0 };
+    let (mut here_m, own_mps) = (sign * here_m, sign * own_mps);
     let (front_m, rear_m, other_mps) = match to {
         None => {
             let ego = VehicleParameters::MKZ;
@@ -247,8 +247,8 @@ fn beside(view: &View, to: Option<u32>) -> Option<Beside> {
             if around.users[0].iter().any(|user| user.obstacle.id == id) {
                 here_m += own_mps * DT_S;
             }
-            let (middle_m, half_m, other_mps) = along_route(other);
-            (middle_m + half_m, middle_m - half_m, other_mps)
+            let (middle_m, half_m, other_mps, _) = along_route(other);
+            (sign * middle_m + half_m, sign * middle_m - half_m, sign * other_mps)
         }
     };
     let is_ahead = here_m > (front_m + rear_m) / 2.0;
