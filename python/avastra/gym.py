@@ -25,6 +25,7 @@ Needs `gymnasium>=1.1,<2`: `pip install './python[gym]'`.
   and its `ended`.
 """
 
+import copy
 import os
 from typing import Any, Dict, List, Literal, Mapping, Optional, Sequence, Tuple, Union
 
@@ -42,16 +43,28 @@ __all__ = ["Env", "VectorEnv"]
 #: Stands for a bound that avastra does not promise: environments should be bounded, and nothing comes near it.
 FAR = 1e9
 
+#: What a learner sees: the variables, or with `mask="observation"` a dict of `observation` and `action_mask`.
+Observation = Union["np.ndarray[Any, np.dtype[np.float32]]", Dict[str, "np.ndarray[Any, Any]"]]
+
 _Seen = Literal["raw", "scaled"]
 _Reward = Literal["space", "judged"]
 
 
-class Env(gymnasium.Env):
+class Env(gymnasium.Env[Observation, np.int64]):
     """One episode after another on one road.
 
-    `space` is a path or a compiled `Space`, `road` the name of one of its roads (without one: the first). `observation` and
-    `reward` are as in `avastra.Episodes`, and so are the other keywords (`ads`, `ads_config`, `ambient`, `traffic`,
-    `with_rules`, `without_rules`, `ads_cmd`). `mask` is `info`, or `observation` for a dict of `observation` and `action_mask`.
+    Args:
+        space: A path, or a compiled `Space`.
+        road: The name of one of its roads; without one the first.
+        observation: `scaled`, shape (36,), about 1 in size, or `raw`, shape (44,), in SI units: as in `avastra.Episodes`.
+        reward: `judged`, or `space` for the reward that the space declares: as in `avastra.Episodes`.
+        mask: `info`, or `observation` for a dict of `observation` and `action_mask`.
+        **conditions: Those of `avastra.Episodes`: `ads`, `ads_config`, `ads_cmd`, `ambient`, `traffic`, `with_rules`,
+            `without_rules`.
+
+    Raises:
+        SpaceError: The space has mistakes; its text is what `avastra check` prints.
+        ValueError: There is no such road, driving system, traffic, rule or mask.
     """
 
     metadata = {"render_modes": []}
@@ -68,8 +81,20 @@ class Env(gymnasium.Env):
         self._legal = np.zeros(self.episodes.rows, dtype=bool)
 
     def reset(self, *, seed: Optional[int] = None,
-              options: Optional[Dict[str, Any]] = None) -> Tuple[Any, Dict[str, Any]]:
-        """Begins an episode. `info` has its `seed` and the `action_mask`, shape (rows,), of its first step; there are no options."""
+              options: Optional[Dict[str, Any]] = None) -> Tuple[Observation, Dict[str, Any]]:
+        """Begins an episode.
+
+        Args:
+            seed: That of the episode, which decides everything but the rows; without one it is drawn.
+            options: There are none.
+
+        Returns:
+            The first observation, and an info with `seed` and `action_mask`, shape (rows,), of the first step.
+
+        Raises:
+            EpisodeError: An external driving system failed as the episode began.
+            ValueError: There is an option.
+        """
         if options:
             raise ValueError(f"no option `{next(iter(options))}`: `reset` takes `seed` alone")
         super().reset(seed=seed)
@@ -77,8 +102,28 @@ class Env(gymnasium.Env):
         observation, self._legal = self.episodes.reset(seed)
         return self._shown(observation), {"seed": seed, "action_mask": self._legal.copy()}
 
-    def step(self, action: Any) -> Tuple[Any, float, bool, bool, Dict[str, Any]]:
-        """Drives one step with a row of the table (0 to rows - 1); the module says what an illegal row does and what `info` has."""
+    def step(self, action: "Union[int, np.integer[Any]]") -> Tuple[Observation, float, bool, bool, Dict[str, Any]]:
+        """Carries a row out and drives for one observation period.
+
+        Args:
+            action: A row of the table, 0 to rows - 1. An illegal one loses the step: nothing happens in it but driving.
+
+        Returns:
+            The next observation; the reward of the step; whether the ego vehicle arrived, which terminates the episode;
+            whether it was truncated (limit of steps, standing still, off the map, failure of an external driving system);
+            and an info (`avastra._native.Info`):
+
+            - `action_mask`: the rows that are legal next, shape (rows,)
+            - `row`: the row that was carried out, -1 without one; `refused`: why the chosen one was not, or `None`
+            - `time_s`: when the step began, s
+            - `proc`: the largest collision probability of the step, in [0, 1]
+            - `collisions`: contacts that began in the step; with `reward="judged"`, `counted`: those that count
+            - `seed`: that of the episode
+            - `ended`, after the last step alone: the judged episode (`avastra._native.Ended`)
+
+        Raises:
+            EpisodeError: There is no such row, or the episode has ended: `reset` begins the next one.
+        """
         observation, reward, end, info = self.episodes.step(int(action))
         self._legal = info["action_mask"]
         terminated = _is_terminal(end)
@@ -93,19 +138,26 @@ class Env(gymnasium.Env):
         self.episodes.close()
         super().close()
 
-    def _shown(self, observation: np.ndarray) -> Any:
+    def _shown(self, observation: "np.ndarray[Any, np.dtype[np.float32]]") -> Observation:
         return _with_mask(observation, self._legal) if self._is_masked else observation
 
 
-class VectorEnv(gymnasium.vector.VectorEnv):
+class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", "np.ndarray[Any, Any]"]):
     """Many episodes at once, stepped on threads of Rust without Python's lock.
 
-    As `Env`, but `road` may be several, which the worlds take in turn. World i with the seed s is `Env` with the seed s + i:
-    the same observations and rewards, whatever the number of `threads` (without one: one for each processor).
+    World i with the seed s is `Env` with the seed s + i: the same observations and rewards, whatever the number of threads.
 
-    `autoreset_mode` is `NEXT_STEP` (a world that has ended begins anew in the next step, whose action is ignored),
-    `SAME_STEP` (at once; the last observation and info are `final_obs` and `final_info`) or `DISABLED` (`reset` with
-    `options={"reset_mask": ...}` begins them).
+    Args:
+        num_envs: How many worlds, at least 1.
+        space, observation, reward, mask, **conditions: As for `Env`.
+        road: As for `Env`, or several, which the worlds take in turn.
+        threads: How many; without it one for each processor.
+        autoreset_mode: `NEXT_STEP` (a world that has ended begins anew in the next step, whose action is ignored),
+            `SAME_STEP` (at once; the last observation and info are `final_obs` and `final_info`) or `DISABLED` (`reset`
+            with `options={"reset_mask": ...}` begins them).
+
+    Raises:
+        SpaceError, ValueError: As for `Env`.
     """
 
     def __init__(self, num_envs: int, space: "Union[str, os.PathLike[str], Space]",
@@ -129,14 +181,27 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self.single_observation_space = _observation_space(first[0], observation, self._is_masked)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._generators: List[Optional[np.random.Generator]] = [None] * num_envs
+        #: What the seeds of each world's next episodes are drawn with, once it has drawn one.
+        self._generators: Dict[int, np.random.Generator] = {}
         self._observations = np.zeros((num_envs, first[0].observation_len), dtype=np.float32)
         self._legal = np.zeros((num_envs, first[0].rows), dtype=bool)
         self._has_ended = np.zeros(num_envs, dtype=bool)
 
     def reset(self, *, seed: Union[int, Sequence[Optional[int]], None] = None,
-              options: Optional[Dict[str, Any]] = None) -> Tuple[Any, Dict[str, Any]]:
-        """Begins an episode in every world, or in those that the option `reset_mask`, shape (worlds,), marks."""
+              options: Optional[Dict[str, Any]] = None) -> Tuple[Observation, Dict[str, Any]]:
+        """Begins an episode in every world.
+
+        Args:
+            seed: That of the first world, of which the others have the next ones; or one for each. Without, it is drawn.
+            options: `reset_mask`, shape (worlds,): in which worlds alone.
+
+        Returns:
+            The observations of all worlds, and the infos of those that begin, as arrays by key (`Env.reset`).
+
+        Raises:
+            EpisodeError: An external driving system failed as an episode began.
+            ValueError: Seeds or mask do not fit the number of worlds.
+        """
         which = np.ones(self.num_envs, dtype=bool)
         if options and "reset_mask" in options:
             which = np.asarray(options["reset_mask"], dtype=bool)
@@ -149,16 +214,28 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         infos = self._begin(np.flatnonzero(which), seed)
         return self._shown(), infos
 
-    def step(self, actions: Any) -> Tuple[Any, np.ndarray, np.ndarray, np.ndarray, Dict[str, Any]]:
-        """Drives one step in every world, each with its row; those whose episodes have ended begin anew as the mode says."""
+    def step(self, actions: Any) -> Tuple[Observation, Any, Any, Any, Dict[str, Any]]:
+        """Drives one step in every world; those whose episodes have ended begin anew as the mode says.
+
+        Args:
+            actions: A row for each world, shape (worlds,).
+
+        Returns:
+            Observations, rewards, terminations and truncations, each with one entry a world, and the infos as arrays by key
+            (`Env.step`).
+
+        Raises:
+            EpisodeError: There is no such row, or in the mode `DISABLED` an episode has ended. No world has moved then, and
+                the next episodes are those that they would have been.
+        """
         begin: List[int] = np.flatnonzero(self._has_ended).tolist()
         if self.autoreset_mode == AutoresetMode.DISABLED and begin:
             raise EpisodeError(f"the episodes of worlds {begin} have ended: reset them with `reset_mask`")
-        seeds: List[Optional[int]] = [None] * self.num_envs
-        for world in begin:
-            seeds[world] = self._next_seed(world)
+        drawn, generators = self._draw(begin)
+        seeds = [drawn.get(world) for world in range(self.num_envs)]
         rows = [int(action) for action in actions]
         observations, legal, rewards, ends, found = step_all(self.worlds, rows, seeds, self.threads)
+        self._generators.update(generators)
         self._observations, self._legal = observations, legal
         self._has_ended = np.array([end is not None for end in ends])
         terminated = np.array([_is_terminal(end) for end in ends])
@@ -182,14 +259,13 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
     def _begin(self, worlds: np.ndarray, seeds: Sequence[Optional[int]]) -> Dict[str, Any]:
         """Begins the next episodes of some worlds. A seed also begins a world's own sequence of seeds."""
-        drawn = []
-        for world in worlds.tolist():
-            wanted = seeds[world]
-            if wanted is not None:
-                self._generators[world] = seeding.np_random(int(wanted))[0]
-            drawn.append(self._next_seed(world) if wanted is None else int(wanted))
+        given = {world: int(seed) for world, seed in enumerate(seeds) if seed is not None}
+        own, generators = self._draw([world for world in worlds.tolist() if world not in given])
+        generators.update({world: seeding.np_random(given[world])[0] for world in worlds.tolist() if world in given})
+        drawn = [given[world] if world in given else own[world] for world in worlds.tolist()]
         some = [self.worlds[world] for world in worlds]
         observations, legal, _, ends, found = step_all(some, [None] * len(some), drawn, self.threads)
+        self._generators.update(generators)
         self._observations[worlds], self._legal[worlds] = observations, legal
         self._has_ended[worlds] = [end is not None for end in ends]
         for world, seed, end in zip(worlds, drawn, ends):
@@ -217,13 +293,13 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         infos["action_mask"] = self._legal.copy()
         infos["_action_mask"] = np.ones(self.num_envs, dtype=bool)
 
-    def _next_seed(self, world: int) -> int:
-        generator = self._generators[world]
-        if generator is None:
-            generator = self._generators[world] = seeding.np_random(None)[0]
-        return _drawn(generator)
+    def _draw(self, worlds: Sequence[int]) -> Tuple[Dict[int, int], Dict[int, np.random.Generator]]:
+        """The seeds of the next episodes of some worlds, and the generators as they are once these have begun."""
+        known = self._generators
+        generators = {world: copy.deepcopy(known[world]) if world in known else seeding.np_random(None)[0] for world in worlds}
+        return {world: _drawn(generator) for world, generator in generators.items()}, generators
 
-    def _shown(self) -> Any:
+    def _shown(self) -> Observation:
         return _with_mask(self._observations.copy(), self._legal) if self._is_masked else self._observations.copy()
 
 

@@ -27,7 +27,7 @@
 //!
 //! // Its choices alone, as a script, play it again to the bit.
 //! let script = Script::of_log(&log);
-//! let mut as_written = |moment: &Moment| script.choose(arena.table(), moment);
+//! let mut as_written = |moment: &Moment| script.choose(moment);
 //! let again = episode::run(&arena.setup(0, 1), &mut as_written);
 //! assert_eq!(again.trace(), log.trace());
 //! # Ok::<(), Box<dyn std::error::Error>>(())

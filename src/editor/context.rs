@@ -10,7 +10,7 @@ use avastra_lang::model::vocabulary::{
 };
 use avastra_lang::syntax::ast::{
     Action, ActionParam, Arm, BinaryOp, Call, Effect, EffectKind, Expr, ExprKind, Field, Initial, ItemKind,
-    Name, Phase, Policy, Rule, RuleBody, Scenario, State, Step, Type as WrittenType, TypeKind,
+    Name, Phase, Policy, Rule, RuleBody, Scenario, Spawn, State, Step, Type as WrittenType, TypeKind,
 };
 use avastra_lang::syntax::{HERE, Unfinished, unfinished};
 
@@ -289,14 +289,15 @@ impl<'a> Place<'a> {
                 true => Some(unused::<CommandField>(fields)),
                 false => self.in_command(field),
             }),
-            EffectKind::Spawn { of: Some(of), .. } if is_here(of) => Some(self.road_users()),
-            EffectKind::Spawn { body, place, distance, apart, cover, fields, .. } => {
-                let mut bodies = [Some(body), cover.as_deref()].into_iter().flatten();
+            EffectKind::Spawn(spawn) if spawn.of.as_ref().is_some_and(is_here) => Some(self.road_users()),
+            EffectKind::Spawn(spawn) => {
+                let Spawn { body, place, distance, apart, cover, fields, .. } = &**spawn;
+                let mut bodies = [Some(body), cover.as_ref()].into_iter().flatten();
                 bodies
                     .find_map(|body| self.word_or_value(Kind::Bodies, body, None))
                     .or_else(|| self.word_or_value(Kind::Trajectories, place.trajectory()?, None))
                     .or_else(|| self.within(distance, None, None))
-                    .or_else(|| self.within(apart.as_deref()?, None, None))
+                    .or_else(|| self.within(apart.as_ref()?, None, None))
                     .or_else(|| self.in_spawn(fields))
             }
         })

@@ -1,8 +1,10 @@
 //! Cases: each file of a directory is rendered, and the result is compared with its snapshot.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::num::NonZero;
 use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 /// The repository.
 pub fn root() -> PathBuf {
@@ -74,24 +76,36 @@ fn is_some_case(wanted: &str) -> bool {
         .any(|area| cases(&area).iter().any(|(stem, _)| stem.contains(wanted)))
 }
 
-/// Tries every case of an area, and names all that fail. With `AVASTRA_CASE` in the environment those whose names hold that.
+/// Tries every case of an area on all cores. Each that fails says why under its own name, and all are named at the end. With
+/// `AVASTRA_CASE` in the environment those alone whose names hold that.
 #[expect(clippy::disallowed_methods, reason = "who runs the tests says which cases")]
-pub fn try_each(area: &str, try_one: impl Fn(&str, &Path)) {
+pub fn try_each(area: &str, try_one: impl Fn(&str, &Path) + Sync) {
     let wanted = std::env::var("AVASTRA_CASE").unwrap_or_default();
     assert!(
         wanted.is_empty() || is_some_case(&wanted),
         "no case in tests/cases holds `{wanted}` in its name"
     );
     let all = cases(area).into_iter().filter(|(stem, _)| stem.contains(&wanted));
-    let fails = |(stem, path): &(String, PathBuf)| {
-        std::panic::catch_unwind(AssertUnwindSafe(|| try_one(stem, path))).is_err()
+    let waiting = Mutex::new(all);
+    let next = || waiting.lock().expect("no case is tried while it is held").next();
+    let failed = Mutex::new(BTreeSet::new());
+    let try_all = || {
+        while let Some((stem, path)) = next() {
+            if let Err(cause) = std::panic::catch_unwind(AssertUnwindSafe(|| try_one(&stem, &path))) {
+                let cause = cause.downcast_ref::<String>().map_or("see above", String::as_str);
+                println!("case {area}/{stem} failed: {cause}");
+                failed.lock().expect("no case is tried while it is held").insert(stem);
+            }
+        }
     };
-    let failed: Vec<String> = all.filter(fails).map(|(stem, _)| stem).collect();
+    let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
+    std::thread::scope(|scope| (0..cores).for_each(|_| drop(scope.spawn(try_all))));
+    let failed: Vec<String> = failed.into_inner().expect("no thread holds it").into_iter().collect();
     assert!(failed.is_empty(), "{} cases of {area} failed: {}", failed.len(), failed.join(", "));
 }
 
 /// Renders every case of an area; input and output stand together in the snapshot.
-pub fn each_case(area: &str, render: impl Fn(&Path) -> String) {
+pub fn each_case(area: &str, render: impl Fn(&Path) -> String + Sync) {
     try_each(area, |stem, path| {
         let source = std::fs::read(path).expect("a case is readable");
         let source = String::from_utf8_lossy(&source);

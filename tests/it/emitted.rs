@@ -72,7 +72,7 @@ fn emitted_scenarios_keep_every_claim() {
         assert!(loaded.diagnostics.is_empty(), "{text}\n{:?}", loaded.diagnostics);
         let scenario = loaded.scenario.as_ref().expect("it has a scenario");
         let script = Script::of_scenario(scenario);
-        let again = run.play(number, &mut |moment| script.choose(run.table(), moment), &mut |_, _, _| {});
+        let again = run.play(number, &mut |moment| script.choose(moment), &mut |_, _, _| {});
         let judgements = oracle::judge(&run.setup(number), &script, &again);
         let replays = Replays {
             cause: &|_| Ok(Vec::new()),

@@ -51,7 +51,7 @@ fn watched(run: &Run, number: usize) -> (EpisodeLog, Vec<Tick>) {
             is_yellow: moment.ego_light == Light::Yellow,
         });
     };
-    let log = run.play(number, &mut |moment| script.choose(run.table(), moment), &mut watch);
+    let log = run.play(number, &mut |moment| script.choose(moment), &mut watch);
     (log, ticks)
 }
 
@@ -226,7 +226,7 @@ fn what_is_asked_of_each_road_user_near_is_asked_of_each_by_itself() {
             let jerk = before.map_or(0.0, |before| accelerations[accelerations.len() - 1] - before);
             jerks.push((time_s, Some(jerk + 2.0)));
         };
-        let again = run.play(number, &mut |moment| script.choose(run.table(), moment), &mut watch);
+        let again = run.play(number, &mut |moment| script.choose(moment), &mut watch);
         assert_eq!(again.breaches, log.breaches);
         for (index, (name, within)) in
             [("keeps_off", 0), ("keeps_off_long", 25), ("smooth", 0)].into_iter().enumerate()
@@ -365,7 +365,7 @@ fn a_finding_says_how_often_it_recurs() {
             setup.start.reactions = child_seed(setup.seed, Stream::Noise, u64::from(*number)) | 1;
             let mut steps = 0..=script.steps.len();
             let choose = &mut |moment: &avastra::episode::Moment| match steps.next() {
-                Some(step) if step < script.steps.len() => script.choose(&table, moment),
+                Some(step) if step < script.steps.len() => script.choose(moment),
                 Some(_) => avastra::episode::Choice::Pass,
                 None => avastra::episode::Choice::Stop,
             };

@@ -553,7 +553,7 @@ fn a_pedestrian_comes_when_the_ego_vehicle_is_30_m_from_the_junction() {
     let run = run_of(space, 1, 4, &[]);
     let script = Script::of_scenario(&scenario);
     let mut seen = Vec::new();
-    let log = run.play(number, &mut |moment| script.choose(run.table(), moment), &mut |world, _, _| {
+    let log = run.play(number, &mut |moment| script.choose(moment), &mut |world, _, _| {
         let appeared = world.obstacles().next().map(|obstacle| obstacle.spawned_tick);
         seen.push((world.moment_facts().ego_junction_ahead_m, appeared));
     });

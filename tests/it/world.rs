@@ -65,7 +65,7 @@ pub fn space_at(name: &str) -> Arc<Space> {
 /// Asserts that an episode, played again from its own log, is the same bit for bit.
 pub fn assert_replays(run: &Run, number: usize, log: &EpisodeLog) {
     let script = Script::of_log(log);
-    let mut again = run.play(number, &mut |moment| script.choose(run.table(), moment), &mut |_, _, _| {});
+    let mut again = run.play(number, &mut |moment| script.choose(moment), &mut |_, _, _| {});
     // A script does not know that a choice was refused, only that nothing happened.
     for (step, was) in again.steps.iter_mut().zip(&log.steps) {
         step.outcome = was.outcome.clone();

@@ -269,7 +269,7 @@ impl Episodes {
 
     /// Begins an episode in the place of the one under way.
     pub fn begin(&self, now: &mut Option<Stepped>, seed: u64) -> Seen {
-        self.view.of(now.insert(Stepped::new(Arc::clone(&self.run), 0, seed)))
+        self.view.of(now.insert(Stepped::new(&self.run.setup_of(0, seed))))
     }
 
     /// Steps the episode under way.

@@ -166,6 +166,21 @@ class ManyWorlds(unittest.TestCase):
             last = info["final_info"] if mode == AutoresetMode.SAME_STEP else info
             self.assertEqual(int(last["seed"][world]), large[world])
 
+    def test_a_step_that_is_refused_changes_no_later_episode(self):
+        def seeds(is_refused_once):
+            env = avastra.gym.VectorEnv(2, SPACE, "crossroad")
+            env.reset(seed=3)
+            ended = np.zeros(2, dtype=bool)
+            while not ended.any():
+                _, _, terminated, truncated, _ = env.step(env.action_masks().argmax(axis=1))
+                ended = terminated | truncated
+            if is_refused_once:
+                with self.assertRaises(avastra.EpisodeError):
+                    env.step([int(not ended[0]) * env.single_action_space.n, int(ended[0]) * env.single_action_space.n])
+            return env.step([0, 0])[4]["seed"].tolist()
+
+        self.assertEqual(seeds(True), seeds(False))
+
     def test_a_driving_system_that_fails_at_once(self):
         with tempfile.TemporaryDirectory() as folder:
             conditions = {"ads_config": failing_profile(folder)}

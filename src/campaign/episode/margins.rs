@@ -27,22 +27,18 @@ pub fn margins_over_time(setup: &Setup, log: &EpisodeLog) -> Vec<MarginSeries> {
         .map(|requirement| MarginSeries { requirement, margins: Vec::new() })
         .collect();
     let mut touched = false;
-    super::run_watched(
-        setup,
-        &mut |moment| script.choose(setup.table, moment),
-        &mut |world: &World, _, contacts| {
-            touched |= !contacts.is_empty();
-            if touched || world.ticks() == 0 {
-                return;
-            }
-            // The step that is driven began before this tick.
-            let begun = log.steps.partition_point(|step| step.time_s < world.time_s() - 1e-6);
-            let step = begun.max(1) - 1;
-            monitor.judge(setup, (world, &own_bodies), log.memory_after(step), step);
-            for one in &mut series {
-                one.margins.push(monitor.now(one.requirement));
-            }
-        },
-    );
+    super::run_watched(setup, &mut |moment| script.choose(moment), &mut |world: &World, _, contacts| {
+        touched |= !contacts.is_empty();
+        if touched || world.ticks() == 0 {
+            return;
+        }
+        // The step that is driven began before this tick.
+        let begun = log.steps.partition_point(|step| step.time_s < world.time_s() - 1e-6);
+        let step = begun.max(1) - 1;
+        monitor.judge(setup, (world, &own_bodies), log.memory_after(step), step);
+        for one in &mut series {
+            one.margins.push(monitor.now(one.requirement));
+        }
+    });
     series
 }

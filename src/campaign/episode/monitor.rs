@@ -168,7 +168,7 @@ impl Monitor {
             }
         };
         // A requirement about stop signs costs nothing where there is none.
-        let is_idle = |index: &usize| is_never_asked(setup.table.space(), *index, &setup.road.facts);
+        let is_idle = |index: &usize| is_never_asked(setup.table.space(), *index, &setup.road().facts);
         let (idle, asked): (Vec<usize>, Vec<usize>) = setup.rules.required().partition(is_idle);
         let watches: Vec<Watch> = asked.into_iter().map(watch).collect();
         let of = |watch: &Watch| &setup.table.space().requirements[watch.required.index].bearers;
@@ -258,7 +258,7 @@ impl Monitor {
             near.npc = watched_of(near.id, near.npc);
         }
         let facts =
-            Facts { road: Some(&setup.road.facts), world: Some(&self.facts), ..Facts::new(&[], memory) };
+            Facts { road: Some(&setup.road().facts), world: Some(&self.facts), ..Facts::new(&[], memory) };
         let functions = &setup.table.space().functions;
         let moment = Judged { functions, facts: &facts, time_s: world.time_s(), step };
         let far = |id: u32| world.npc_facts(id).map(|npc| watched_of(id, npc));

@@ -27,27 +27,26 @@ pub struct Moment<'a> {
     pub observation: &'a Observation,
     pub situation: &'a Situation<'a>,
     play: &'a Play,
-    setup: &'a Setup<'a>,
 }
 
 impl<'a> Moment<'a> {
     /// What the episode is made of.
-    pub fn setup(&self) -> &'a Setup<'a> {
-        self.setup
+    pub fn setup(&self) -> &'a Setup {
+        &self.play.setup
     }
 
     /// The log of the episode as it would be one observation period after an action. The episode itself does not
     /// change.
     pub fn look_ahead(&self, draw: Draw) -> EpisodeLog {
         let mut copy = self.play.clone();
-        let begun = Begun::With(copy.carry_out(draw, 0, self.setup));
-        copy.observation_period(self.setup, self.observation.clone(), begun, &mut |_, _, _| {});
-        copy.into_log(self.setup, End::Script)
+        let begun = Begun::With(copy.carry_out(draw, 0));
+        copy.observation_period(self.observation.clone(), begun, &mut |_, _, _| {});
+        copy.into_log(End::Script)
     }
 
     /// The log of the episode up to now.
     pub fn log(&self) -> EpisodeLog {
-        self.play.clone().into_log(self.setup, End::Script)
+        self.play.clone().into_log(End::Script)
     }
 
     /// Number of collisions up to now.
@@ -100,8 +99,13 @@ impl Choice {
 
     /// The choice of a row with given values. Of several refusals the first counts.
     pub fn judged(row: usize, judged: Result<Draw, Vec<Refusal>>) -> Choice {
-        Choice::of(row, judged.map_err(|mut refusals| refusals.swap_remove(0)))
+        Choice::of(row, first(judged))
     }
+}
+
+/// Of several refusals the first.
+fn first(judged: Result<Draw, Vec<Refusal>>) -> Offer {
+    judged.map_err(|mut refusals| refusals.swap_remove(0))
 }
 
 /// Plays one episode. `choose` is called once a step.
@@ -115,33 +119,31 @@ pub fn run_watched(
     choose: &mut dyn FnMut(&Moment) -> Choice,
     watch: &mut Watch,
 ) -> EpisodeLog {
-    run_from(setup, None, choose, watch, &mut |_| {})
+    run_from(Play::new(setup), choose, watch, &mut |_| {})
 }
 
-/// As [`run`], but from `from`, a kept moment of an episode with this setup, or from the start without one. The log
-/// covers the whole episode. `last` gets the moment at which the next choice would have been due.
+/// As [`run_watched`], but from `play`, the start of an episode or a kept moment of one. The log covers the whole episode.
+/// `last` gets the moment at which the next choice would have been due.
 pub fn run_from(
-    setup: &Setup,
-    from: Option<Play>,
+    mut play: Play,
     choose: &mut dyn FnMut(&Moment) -> Choice,
     watch: &mut Watch,
     last: &mut dyn FnMut(&Moment),
 ) -> EpisodeLog {
-    let mut play = from.unwrap_or_else(|| Play::new(setup));
     watch(&play.world, play.ads.as_ref(), &[]);
     let end = loop {
         let observation = match play.look() {
             Ok(observation) => observation,
             Err(end) => break end,
         };
-        let choice = play.at(setup, &observation, |moment| choose(moment));
-        if let Some(end) = play.step(setup, observation, choice, watch) {
+        let choice = play.at(&observation, |moment| choose(moment));
+        if let Some(end) = play.step(observation, choice, watch) {
             break end;
         }
     };
     let observation = play.observation();
-    play.at(setup, &observation, |moment| last(moment));
-    play.into_log(setup, end)
+    play.at(&observation, |moment| last(moment));
+    play.into_log(end)
 }
 
 /// What became of the choice of a step when the step began.
@@ -161,10 +163,10 @@ struct Waiting {
 
 impl Waiting {
     /// Whether the action happens before this tick of the step.
-    fn is_due(&mut self, tick: i64, play: &Play, setup: &Setup) -> bool {
+    fn is_due(&mut self, tick: i64, play: &Play) -> bool {
         let Some(trigger) = self.action.trigger.as_deref() else { return true };
         if self.come_tick.is_none() {
-            let holds = trigger.once.as_ref().is_none_or(|once| play.holds(&once.expr, trigger, setup));
+            let holds = trigger.once.as_ref().is_none_or(|once| play.holds(&once.expr, trigger));
             self.held_since = holds.then(|| self.held_since.unwrap_or(tick));
             let has_come = |since: &i64| tick - since >= i64::from(trigger.held_ticks);
             self.come_tick = self.held_since.filter(has_come).map(|_| tick);
@@ -181,10 +183,10 @@ impl Waiting {
 }
 
 /// An episode under way. [`run`] is a loop over [`Play::look`] and [`Play::step`]; a caller that cannot be called back
-/// from a loop uses these two itself. Each call takes the setup that the episode was begun with. A clone is a snapshot,
-/// which can be played on as often as wanted.
+/// from a loop uses these two itself. A clone is a snapshot, which can be played on as often as wanted.
 #[derive(Clone)]
 pub struct Play {
+    setup: Arc<Setup>,
     world: World,
     ads: Box<dyn Ads>,
     sensed: Sensed,
@@ -210,6 +212,7 @@ impl Play {
         world.sense(&mut sensed);
         Play {
             chronicle: Chronicle::new(setup, &world),
+            setup: Arc::new(setup.clone()),
             world,
             ads,
             sensed,
@@ -241,29 +244,27 @@ impl Play {
     }
 
     /// Calls `see` with this moment, in which a choice is due, and returns what it gives.
-    pub fn at<T>(&self, setup: &Setup, observation: &Observation, see: impl FnOnce(&Moment) -> T) -> T {
-        let situation = self.situation(setup);
-        see(&Moment { step: self.steps.len(), observation, situation: &situation, play: self, setup })
+    pub fn at<T>(&self, observation: &Observation, see: impl FnOnce(&Moment) -> T) -> T {
+        let situation = self.situation();
+        see(&Moment { step: self.steps.len(), observation, situation: &situation, play: self })
     }
 
     /// Carries out a choice that was made on `observation`, then drives for one observation period. Returns how the
     /// episode ended, if it ended.
-    pub fn step(
-        &mut self,
-        setup: &Setup,
-        observation: Observation,
-        choice: Choice,
-        watch: &mut Watch,
-    ) -> Option<End> {
+    pub fn step(&mut self, observation: Observation, choice: Choice, watch: &mut Watch) -> Option<End> {
         let begun = match choice {
-            Choice::Act(draw) => Begun::With(self.carry_out(draw, 0, setup)),
+            Choice::Act(draw) => Begun::With(self.carry_out(draw, 0)),
             Choice::Await(action) => Begun::Waiting(Waiting { action, held_since: None, come_tick: None }),
             Choice::Pass => Begun::With(Outcome::Passed),
             Choice::Refused { row, rule, reason } => Begun::With(Outcome::Refused { row, rule, reason }),
             Choice::Stop => return Some(End::Script),
         };
-        self.observation_period(setup, observation, begun, watch);
-        self.end(setup)
+        self.observation_period(observation, begun, watch);
+        self.end()
+    }
+
+    pub fn setup(&self) -> &Setup {
+        &self.setup
     }
 
     /// The steps so far.
@@ -276,11 +277,11 @@ impl Play {
         self.chronicle.collisions()
     }
 
-    fn situation<'s>(&'s self, setup: &'s Setup) -> Situation<'s> {
+    fn situation(&self) -> Situation<'_> {
         Situation {
             memory: &self.memory,
-            road: setup.road,
-            rules: setup.rules,
+            road: self.setup.road(),
+            rules: &self.setup.rules,
             surroundings: &self.world,
             seed: self.seed,
             step: self.steps.len() as u64,
@@ -289,7 +290,7 @@ impl Play {
     }
 
     /// Carries out a whole action or nothing of it.
-    fn carry_out(&mut self, draw: Draw, delay_ticks: u32, setup: &Setup) -> Outcome {
+    fn carry_out(&mut self, draw: Draw, delay_ticks: u32) -> Outcome {
         let newcomers = match self.world.carry_out(&draw) {
             Ok(newcomers) => newcomers,
             Err((_, reason)) => return Outcome::Refused { row: draw.row, rule: None, reason },
@@ -301,15 +302,15 @@ impl Play {
             self.chronicle.appeared(effect, id);
         }
         self.memory = draw.memory_after.clone();
-        if let Some(happened_s) = self.happened_s.get_mut(setup.table.rows()[draw.row].action) {
+        if let Some(happened_s) = self.happened_s.get_mut(self.setup.table.rows()[draw.row].action) {
             *happened_s = self.world.time_s();
         }
         Outcome::Done { draw, spawned, delay_ticks }
     }
 
     /// What every step does, in a step without an action.
-    fn wait(&mut self, setup: &Setup) {
-        let (effects, memory) = setup.table.wait(&self.situation(setup));
+    fn wait(&mut self) {
+        let (effects, memory) = self.setup.table.wait(&self.situation());
         for effect in effects {
             self.world.apply(&effect).expect("weather and time of day need no place");
         }
@@ -317,23 +318,17 @@ impl Play {
     }
 
     /// One observation period (OTP), and its line in the log.
-    fn observation_period(
-        &mut self,
-        setup: &Setup,
-        observation: Observation,
-        begun: Begun,
-        watch: &mut Watch,
-    ) {
+    fn observation_period(&mut self, observation: Observation, begun: Begun, watch: &mut Watch) {
         // No space in which every step does something has actions that wait (AV0609).
         if matches!(&begun, Begun::With(Outcome::Passed | Outcome::Refused { .. })) {
-            self.wait(setup);
+            self.wait();
         }
         let (time_s, station_m) = (self.world.time_s(), self.world.ego_station_m());
         let before = self.chronicle.begin_step(time_s);
-        let (outcome, near) = self.drive(setup, begun, watch);
+        let (outcome, near) = self.drive(begun, watch);
         self.count_stalled(self.world.ego_station_m() - station_m);
         let (facts, margins) = self.chronicle.end_step(before, near);
-        let reward = setup.table.space().reward(facts, &self.memory, margins);
+        let reward = self.setup.table.space().reward(facts, &self.memory, margins);
         let step = StepLog {
             time_s,
             state: observation.state,
@@ -349,22 +344,21 @@ impl Play {
 
     /// Drives for one observation period, or until the goal or the end of the map. What became of the step's action, and how
     /// near a collision was at most.
-    fn drive(&mut self, setup: &Setup, mut begun: Begun, watch: &mut Watch) -> (Outcome, Near) {
+    fn drive(&mut self, mut begun: Begun, watch: &mut Watch) -> (Outcome, Near) {
         let mut near: Option<Near> = None;
-        let episode = &setup.table.space().episode;
-        let shift = setup.period_shifts.get(self.steps.len()).copied().unwrap_or(0);
-        let ticks = (episode.step_s / DT_S).round() as i64 + i64::from(shift);
+        let shift = self.setup.period_shifts.get(self.steps.len()).copied().unwrap_or(0);
+        let ticks = (self.setup.table.space().episode.step_s / DT_S).round() as i64 + i64::from(shift);
         for tick in 0..ticks {
             if let Begun::Waiting(waiting) = &mut begun
-                && waiting.is_due(tick, self, setup)
+                && waiting.is_due(tick, self)
             {
-                begun = Begun::With(self.carry_out_awaited(waiting, tick, setup));
+                begun = Begun::With(self.carry_out_awaited(waiting, tick));
             }
-            let Some(now) = self.tick(setup, watch) else { break };
+            let Some(now) = self.tick(watch) else { break };
             if near.is_none_or(|near| now.probability > near.probability) {
                 near = Some(now);
             }
-            if episode.stop_arrived && self.world.arrived() || self.world.left_the_map() {
+            if self.is_over().is_some() {
                 break;
             }
         }
@@ -385,19 +379,18 @@ impl Play {
     }
 
     /// Judges and carries out an action whose moment has come.
-    fn carry_out_awaited(&mut self, waiting: &Waiting, tick: i64, setup: &Setup) -> Outcome {
-        let judged = waiting.action.judged(setup.table, &self.situation(setup));
-        match judged {
-            Choice::Act(draw) => self.carry_out(draw, tick as u32, setup),
-            Choice::Refused { row, rule, reason } => Outcome::Refused { row, rule, reason },
-            Choice::Await(_) | Choice::Pass | Choice::Stop => unreachable!("a judgement allows or refuses"),
+    fn carry_out_awaited(&mut self, waiting: &Waiting, tick: i64) -> Outcome {
+        let judged = waiting.action.judged(&self.setup.table, &self.situation());
+        match first(judged) {
+            Ok(draw) => self.carry_out(draw, tick as u32),
+            Err(Refusal { rule, reason }) => Outcome::Refused { row: waiting.action.row, rule, reason },
         }
     }
 
     /// One physics step. Returns the collision probability after it, or `None` if the driving system failed and nothing
     /// moved. The probability is 1 at the tick of a contact. After that the obstacle is ignored: it stands against the
     /// ego vehicle for a while and is no danger any more.
-    fn tick(&mut self, setup: &Setup, watch: &mut Watch) -> Option<Near> {
+    fn tick(&mut self, watch: &mut Watch) -> Option<Near> {
         self.world.sense(&mut self.sensed);
         let control = self.ads.drive(&self.sensed);
         if self.ads.failure().is_some() {
@@ -405,19 +398,19 @@ impl Play {
         }
         self.chronicle.note_answer(&self.world, self.ads.as_ref());
         let contacts = self.world.tick(&control).to_vec();
-        self.chronicle.note(setup, self.steps.len(), &self.memory, &self.world, &contacts);
+        self.chronicle.note(&self.setup, self.steps.len(), &self.memory, &self.world, &contacts);
         watch(&self.world, self.ads.as_ref(), &contacts);
         let body = |id| self.chronicle.body(&self.world, id);
         if let Some(contact) = contacts.first() {
             return Some(Near { probability: 1.0, body: body(contact.obstacle) });
         }
         let Danger { probability, nearest } =
-            setup.proc.danger(&self.world, &|id| self.chronicle.has_hit(id));
+            self.setup.proc.danger(&self.world, &|id| self.chronicle.has_hit(id));
         Some(Near { probability, body: nearest.and_then(body) })
     }
 
     /// Whether the condition of a trigger holds now.
-    fn holds(&self, condition: &Expr, trigger: &Trigger, setup: &Setup) -> bool {
+    fn holds(&self, condition: &Expr, trigger: &Trigger) -> bool {
         let users = trigger.road_users().into_iter();
         let bearers = trigger.bearers().into_iter();
         let world = WorldFacts {
@@ -427,9 +420,12 @@ impl Play {
             bearers: bearers.filter_map(|who| Some((who, self.world.bearer_facts(who)?))).collect(),
             ..WorldFacts::default()
         };
-        let facts =
-            Facts { road: Some(&setup.road.facts), world: Some(&world), ..Facts::new(&[], &self.memory) };
-        evaluate(condition, &setup.table.space().functions, &facts).truth()
+        let facts = Facts {
+            road: Some(&self.setup.road().facts),
+            world: Some(&world),
+            ..Facts::new(&[], &self.memory)
+        };
+        evaluate(condition, &self.setup.table.space().functions, &facts).truth()
     }
 
     /// The end of an episode whose driving system cannot drive any more.
@@ -437,33 +433,35 @@ impl Play {
         self.ads.failure().map(|failure| End::Failed(failure.kind()))
     }
 
-    fn end(&self, setup: &Setup) -> Option<End> {
-        let episode = &setup.table.space().episode;
-        if let Some(end) = self.failed() {
-            Some(end)
-        } else if episode.stop_arrived && self.world.arrived() {
-            Some(End::Arrived)
-        } else if self.world.left_the_map() {
-            Some(End::LeftMap)
-        } else if episode.stalled_steps.is_some_and(|limit| self.stalled >= limit) {
-            Some(match () {
-                () if self.world.is_blocked() => End::Blocked,
-                () if self.world.is_astray() => End::Astray,
-                () => End::Stalled,
-            })
-        } else if self.steps.len() >= episode.step_limit as usize {
-            Some(End::StepLimit)
-        } else {
-            None
+    /// The end of an episode that goes on at no tick more.
+    fn is_over(&self) -> Option<End> {
+        match () {
+            () if self.setup.table.space().episode.stop_arrived && self.world.arrived() => Some(End::Arrived),
+            () if self.world.left_the_map() => Some(End::LeftMap),
+            () => self.failed(),
         }
     }
 
+    /// The end of an episode that goes on with no step more.
+    fn end(&self) -> Option<End> {
+        let episode = &self.setup.table.space().episode;
+        let is_stalled = || episode.stalled_steps.is_some_and(|limit| self.stalled >= limit);
+        let stalled = || match () {
+            () if self.world.is_blocked() => End::Blocked,
+            () if self.world.is_astray() => End::Astray,
+            () => End::Stalled,
+        };
+        let is_last = || self.steps.len() >= episode.step_limit as usize;
+        self.is_over().or_else(|| is_stalled().then(stalled)).or_else(|| is_last().then_some(End::StepLimit))
+    }
+
     /// The log of the episode, which ended so.
-    pub fn into_log(self, setup: &Setup, end: End) -> EpisodeLog {
+    pub fn into_log(self, end: End) -> EpisodeLog {
+        let setup = &self.setup;
         let Records { held, collisions, incidents, breaches, margins, distance_m } =
             self.chronicle.into_records();
         EpisodeLog {
-            road: setup.road.name.clone(),
+            road: setup.road().name.clone(),
             ads: setup.ads.name().to_owned(),
             profile: setup.ads.profile().copied(),
             conversation: self.ads.conversation().map(Arc::new),
@@ -483,5 +481,167 @@ impl Play {
             steps: self.steps,
             held,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Mutex;
+
+    use avastra_drivers::{Selected, Status, by_name};
+    use avastra_lang::check::{ReadError, load};
+    use avastra_lang::model::RulesInForce;
+    use avastra_search::mdp::ProcKind;
+    use avastra_world::action::ActionTable;
+    use avastra_world::sim::{Control, Scene, Start};
+
+    use super::*;
+
+    /// What was called, in order.
+    type Tape = Arc<Mutex<Vec<&'static str>>>;
+
+    fn note(tape: &Tape, what: &'static str) {
+        tape.lock().unwrap().push(what);
+    }
+
+    /// A driving system that notes when it is asked.
+    #[derive(Clone)]
+    struct Taped {
+        driver: Box<dyn Ads>,
+        tape: Tape,
+    }
+
+    impl Ads for Taped {
+        fn drive(&mut self, sensed: &Sensed) -> Control {
+            note(&self.tape, "drive");
+            self.driver.drive(sensed)
+        }
+
+        fn status(&self) -> &Status {
+            self.driver.status()
+        }
+    }
+
+    /// Row 0 is always legal, row 1 in effect never. An episode has three steps of five ticks.
+    const SPACE: &str = r#"
+language 1
+use "../../scenarios/roads.ava"
+episode { roads: [crossroad], step: 0.1 s, limit: 3 steps }
+state wet: Bool = false
+action pour() { set wet = true }
+action dry() { set wet = false }
+rule never on dry: ego.speed > 60 m/s
+"#;
+
+    fn setup() -> Setup {
+        let read = |path: &Path| match path.ends_with("taped.ava") {
+            true => Ok(SPACE.to_owned()),
+            false => std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string())),
+        };
+        let loaded = load(Path::new("taped.ava"), &read).unwrap();
+        let space = loaded.space.unwrap_or_else(|| panic!("{:?}", loaded.diagnostics));
+        let (rules, seed) = (RulesInForce::by_default(&space), 1);
+        let road = &space.roads[0];
+        let memory = space.memory_at_start(road, &rules, seed).unwrap();
+        Setup {
+            road: 0,
+            scene: Arc::new(Scene::of(road)),
+            rules: Arc::new(rules),
+            ads: Selected::new(by_name("modular").unwrap()),
+            seed,
+            start: Start::drawn(&space, road, &memory, seed),
+            memory,
+            period_shifts: Vec::new(),
+            proc: ProcKind::default(),
+            table: ActionTable::new(space),
+        }
+    }
+
+    /// Plays an episode and notes every call; `choose` says what happens in which step.
+    fn taped(choose: &dyn Fn(&Moment) -> Choice) -> (EpisodeLog, Vec<&'static str>) {
+        let tape = Tape::default();
+        let mut play = Play::new(&setup());
+        play.ads = Box::new(Taped { driver: play.ads, tape: tape.clone() });
+        let log = run_from(
+            play,
+            &mut |moment| {
+                note(&tape, "choose");
+                choose(moment)
+            },
+            &mut |_, _, _| note(&tape, "watch"),
+            &mut |_| note(&tape, "last"),
+        );
+        let calls = tape.lock().unwrap().clone();
+        (log, calls)
+    }
+
+    fn pour(moment: &Moment) -> Choice {
+        Choice::of(0, moment.setup().table.offer(moment.situation, 0))
+    }
+
+    #[test]
+    fn each_step_is_chosen_and_each_of_its_ticks_driven_then_watched() {
+        let (log, calls) = taped(&pour);
+        let step = [&["choose"][..], &["drive", "watch"].repeat(5)].concat();
+        assert_eq!(calls, [&["watch"][..], &step.repeat(3), &["last"]].concat());
+        assert_eq!((log.end, log.steps.len(), log.ticks), (End::StepLimit, 3, 15));
+    }
+
+    #[test]
+    fn the_end_of_a_script_plays_no_step_more() {
+        let (log, calls) = taped(&|moment| if moment.step == 1 { Choice::Stop } else { pour(moment) });
+        assert_eq!(calls.iter().filter(|call| **call == "drive").count(), 5);
+        assert_eq!(calls[calls.len() - 2..], ["choose", "last"]);
+        assert_eq!((log.end, log.steps.len()), (End::Script, 1));
+    }
+
+    #[test]
+    fn what_is_refused_or_passed_is_driven_all_the_same() {
+        let never = |moment: &Moment| Choice::of(1, moment.setup().table.offer(moment.situation, 1));
+        let (refused, _) = taped(&never);
+        let (passed, _) = taped(&|_| Choice::Pass);
+        for step in &refused.steps {
+            assert!(
+                matches!(&step.outcome, Outcome::Refused { row: 1, rule: Some(rule), .. } if rule == "never")
+            );
+        }
+        assert_eq!(refused.trace(), passed.trace());
+    }
+
+    #[test]
+    fn an_action_that_waits_happens_at_its_tick_or_in_vain() {
+        let after = |ticks: u32| {
+            let trigger = Some(Arc::new(Trigger { once: None, held_ticks: 0, after_ticks: ticks }));
+            taped(&move |_| {
+                Choice::Await(ScriptedAction { row: 0, values: Vec::new(), trigger: trigger.clone() })
+            })
+        };
+        for ticks in 0..5 {
+            let (log, _) = after(ticks);
+            assert!(
+                matches!(log.steps[0].outcome, Outcome::Done { delay_ticks, .. } if delay_ticks == ticks)
+            );
+        }
+        let (late, _) = after(5);
+        assert!(matches!(&late.steps[0].outcome, Outcome::Refused { row: 0, rule: None, .. }));
+    }
+
+    #[test]
+    fn a_snapshot_and_a_look_ahead_leave_the_episode_as_it_is() {
+        let (plain, _) = taped(&pour);
+        let kept = Mutex::new(None);
+        let (looked, _) = taped(&|moment| {
+            if moment.step == 1 {
+                *kept.lock().unwrap() = Some(moment.snapshot());
+            }
+            if let Choice::Act(draw) = pour(moment) {
+                assert_eq!(moment.look_ahead(draw).steps.len(), moment.step + 1);
+            }
+            pour(moment)
+        });
+        assert_eq!(looked, plain);
+        let kept = kept.into_inner().unwrap().expect("it was kept in step 1");
+        assert_eq!(run_from(kept, &mut |moment| pour(moment), &mut |_, _, _| {}, &mut |_| {}), plain);
     }
 }

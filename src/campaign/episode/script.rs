@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use avastra_lang::model::{Scenario, Trigger, Value};
-use avastra_world::action::{ActionTable, Situation};
+use avastra_world::action::{ActionTable, Draw, Refusal, Situation};
 
 use super::log::{EpisodeLog, Outcome};
 use super::run::{Choice, Moment};
@@ -25,9 +25,9 @@ pub struct ScriptedAction {
 }
 
 impl ScriptedAction {
-    /// The action under the rules of the run, or its refusal.
-    pub(super) fn judged(&self, table: &ActionTable, situation: &Situation) -> Choice {
-        Choice::judged(self.row, table.check(situation, self.row, &self.values))
+    /// The action under the rules of the run, or its refusals.
+    pub(super) fn judged(&self, table: &ActionTable, situation: &Situation) -> Result<Draw, Vec<Refusal>> {
+        table.check(situation, self.row, &self.values)
     }
 }
 
@@ -61,12 +61,14 @@ impl Script {
 
     /// The choice at a moment: the recorded action under the rules of the run, or its refusal; an action that has a
     /// moment of its own is judged then.
-    pub fn choose(&self, table: &ActionTable, moment: &Moment) -> Choice {
+    pub fn choose(&self, moment: &Moment) -> Choice {
         match self.steps.get(moment.step) {
             None => Choice::Stop,
             Some(None) => Choice::Pass,
             Some(Some(action)) if action.trigger.is_some() => Choice::Await(action.clone()),
-            Some(Some(action)) => action.judged(table, moment.situation),
+            Some(Some(action)) => {
+                Choice::judged(action.row, action.judged(&moment.setup().table, moment.situation))
+            }
         }
     }
 }

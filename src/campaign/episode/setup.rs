@@ -10,11 +10,12 @@ use avastra_world::sim::{Scene, Start};
 
 /// Everything that determines an episode, except the choices.
 #[derive(Clone)]
-pub struct Setup<'a> {
-    pub table: &'a ActionTable,
-    pub road: &'a Road,
+pub struct Setup {
+    pub table: ActionTable,
+    /// Index of the road in the space.
+    pub road: usize,
     pub scene: Arc<Scene>,
-    pub rules: &'a RulesInForce,
+    pub rules: Arc<RulesInForce>,
     pub ads: Selected,
     pub seed: u64,
     pub start: Start,
@@ -25,4 +26,10 @@ pub struct Setup<'a> {
     pub period_shifts: Vec<i32>,
     /// How collision probabilities are computed.
     pub proc: ProcKind,
+}
+
+impl Setup {
+    pub fn road(&self) -> &Road {
+        &self.table.space().roads[self.road]
+    }
 }

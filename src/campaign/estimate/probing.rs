@@ -241,7 +241,7 @@ fn tried(estimate: &Estimate, setup: &Setup, from: Play, step: usize, draw: Draw
         }
         choose(agent.as_mut(), moment).0
     };
-    let log = episode::run_from(setup, Some(from), &mut choices, &mut |_, _, _| {}, &mut |_| {});
+    let log = episode::run_from(from, &mut choices, &mut |_, _, _| {}, &mut |_| {});
     let ticks = log.ticks - begun_ticks;
     (log, ticks as f64 * avastra_world::sim::DT_S)
 }

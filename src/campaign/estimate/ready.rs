@@ -62,7 +62,7 @@ impl Estimate {
     }
 
     /// The nth episode of a part.
-    pub(super) fn setup(&self, part: Part, number: u32) -> Setup<'_> {
+    pub(super) fn setup(&self, part: Part, number: u32) -> Setup {
         self.run.setup_of(part.road, rng::child_seed(self.seed(part), Stream::Episode, u64::from(number)))
     }
 

@@ -155,7 +155,7 @@ fn before_each<T>(
     let Some(last) = log.collisions.last() else { return judged };
     let mut choose = |moment: &Moment<'_>| match moment.step > last.step {
         true => Choice::Stop,
-        false => script.choose(setup.table, moment),
+        false => script.choose(moment),
     };
     let kept = ticks(REWIND_S) + ticks(WATCH_S);
     let mut recording: VecDeque<World> = VecDeque::with_capacity(kept);

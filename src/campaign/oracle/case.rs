@@ -118,7 +118,7 @@ pub fn regression(setup: &Setup, log: &EpisodeLog, index: usize, ads: &Selected)
 
 /// A finding of an episode, and how to play up to it.
 pub(super) struct Case<'a> {
-    pub setup: &'a Setup<'a>,
+    pub setup: &'a Setup,
     pub script: Script,
     pub what: What,
 }
@@ -137,7 +137,7 @@ pub(super) enum What {
 
 impl<'a> Case<'a> {
     /// A finding of a log that was played from `setup`.
-    pub fn new(setup: &'a Setup<'a>, log: &EpisodeLog, found: Found) -> Case<'a> {
+    pub fn new(setup: &'a Setup, log: &EpisodeLog, found: Found) -> Case<'a> {
         let what = match found {
             Found::Collision(index) => {
                 let collision = log.collisions[index];
@@ -166,7 +166,7 @@ impl<'a> Case<'a> {
     /// Plays the script with a driving system.
     pub fn play(&self, ads: &Selected) -> EpisodeLog {
         let setup = Setup { ads: ads.clone(), ..self.setup.clone() };
-        let choose = |moment: &Moment<'_>| self.script.choose(setup.table, moment);
+        let choose = |moment: &Moment<'_>| self.script.choose(moment);
         play(&setup, choose).0
     }
 

@@ -85,7 +85,7 @@ impl<'a> Inquiry<'a> {
     pub fn new(case: &'a Case<'a>) -> Result<Inquiry<'a>, NoModules> {
         let ads = &case.setup.ads;
         let profile = *ads.profile().ok_or_else(|| NoModules { ads: ads.title() })?;
-        let (_, foresight) = play(case.setup, |moment| case.script.choose(case.setup.table, moment));
+        let (_, foresight) = play(case.setup, |moment| case.script.choose(moment));
         let begun_s = match case.what {
             What::Collision { collision, .. } => collision.spawned_s,
             What::Breach(_) => 0.0,

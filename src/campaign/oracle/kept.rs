@@ -39,7 +39,7 @@ pub fn breached(setup: &Setup, script: &Script, log: &EpisodeLog) -> Vec<Breache
         let entry = ads::by_name(name).expect("careful drivers are driving systems of avastra");
         let setup = Setup { ads: Selected::new(entry), ..setup.clone() };
         let mut choose = |moment: &Moment| match moment.step.cmp(&(last.step + 1)) {
-            Ordering::Less => script.choose(setup.table, moment),
+            Ordering::Less => script.choose(moment),
             Ordering::Equal => Choice::Pass,
             Ordering::Greater => Choice::Stop,
         };

@@ -58,11 +58,9 @@ pub(super) fn measure(case: &Case, own: &ModularConfig, baseline: &ModularConfig
     let What::Collision { collision, .. } = case.what else { return Vec::new() };
     let contact = &collision.contact;
     let mut gauge = Gauge { obstacle: contact.obstacle, contact_s: contact.time_s, ..Gauge::default() };
-    episode::run_watched(
-        case.setup,
-        &mut |moment| case.script.choose(case.setup.table, moment),
-        &mut |world, ads, _| gauge.look(world, ads),
-    );
+    episode::run_watched(case.setup, &mut |moment| case.script.choose(moment), &mut |world, ads, _| {
+        gauge.look(world, ads)
+    });
     gauge.measures(own, baseline)
 }
 

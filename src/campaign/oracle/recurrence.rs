@@ -42,7 +42,7 @@ impl fmt::Display for Recurrence {
 
 /// An episode, and plays of its scenario under other chance.
 pub struct Replayed<'a> {
-    setup: &'a Setup<'a>,
+    setup: &'a Setup,
     log: &'a EpisodeLog,
     again: Vec<EpisodeLog>,
 }
@@ -50,7 +50,7 @@ pub struct Replayed<'a> {
 impl<'a> Replayed<'a> {
     /// Plays `script`, which led to `log`, so many times more. One step without an action comes after it, so that what only
     /// happens later is still seen.
-    pub fn new(setup: &'a Setup<'a>, script: &Script, log: &'a EpisodeLog, replays: u32) -> Replayed<'a> {
+    pub fn new(setup: &'a Setup, script: &Script, log: &'a EpisodeLog, replays: u32) -> Replayed<'a> {
         let mut script = script.clone();
         script.steps.push(None);
         let play = |number| {
@@ -63,7 +63,7 @@ impl<'a> Replayed<'a> {
                 },
                 ..setup.clone()
             };
-            let mut choose = |moment: &Moment| script.choose(setup.table, moment);
+            let mut choose = |moment: &Moment| script.choose(moment);
             episode::run(&setup, &mut choose)
         };
         Replayed { setup, log, again: (1..=replays).map(play).collect() }

@@ -127,7 +127,7 @@ enum Wanted {
 
 /// What must stay, and the number of plays so far.
 struct Search<'a> {
-    setup: &'a Setup<'a>,
+    setup: &'a Setup,
     wanted: Wanted,
     plays: u32,
 }
@@ -136,7 +136,7 @@ struct Search<'a> {
 type Wish<'w> = Option<(usize, &'w ScriptedAction)>;
 
 impl<'a> Search<'a> {
-    fn new(setup: &'a Setup<'a>, log: &EpisodeLog, found: Found, judgements: &[Judgement]) -> Search<'a> {
+    fn new(setup: &'a Setup, log: &EpisodeLog, found: Found, judgements: &[Judgement]) -> Search<'a> {
         let wanted = match found {
             Found::Collision(index) => Wanted::Crash {
                 body: log.collisions[index].body,
@@ -198,12 +198,12 @@ impl<'a> Search<'a> {
             Some((step, ScriptedAction { row, values, .. })) if step == moment.step => {
                 Choice::judged(*row, setup.table.nearest(moment.situation, *row, values))
             }
-            _ => candidate.script.choose(setup.table, moment),
+            _ => candidate.script.choose(moment),
         };
         episode::run(&setup, choose)
     }
 
-    fn begin(&self, candidate: &Candidate) -> Setup<'_> {
+    fn begin(&self, candidate: &Candidate) -> Setup {
         Setup { start: candidate.start, memory: candidate.memory.clone(), ..self.setup.clone() }
     }
 
@@ -286,8 +286,8 @@ impl<'a> Search<'a> {
         for (step, logged) in log.steps.iter().enumerate().take(best.script.steps.len()) {
             let Outcome::Done { draw, .. } = &logged.outcome else { continue };
             for row in 0..self.setup.table.rows().len() {
-                if effects(self.setup.table, row)
-                    >= draw.effects.len().min(effects(self.setup.table, draw.row))
+                if effects(&self.setup.table, row)
+                    >= draw.effects.len().min(effects(&self.setup.table, draw.row))
                 {
                     continue;
                 }
@@ -315,7 +315,7 @@ impl<'a> Search<'a> {
                 continue;
             }
             let Start { ego_mps, signal_phase_s, seed, ambient, traffic, .. } = best.start;
-            let start = Start::drawn(space, self.setup.road, &candidate.memory, self.setup.seed);
+            let start = Start::drawn(space, self.setup.road(), &candidate.memory, self.setup.seed);
             candidate.start = Start { ego_mps, signal_phase_s, seed, ambient, traffic, ..start };
             self.take(best, candidate, None);
         }

@@ -70,9 +70,9 @@ fn varied(case: &Case, number: u32) -> EpisodeLog {
 /// The action of a step with other speeds. Where none of several draws is legal, the action is tried as it
 /// was written.
 fn choose(case: &Case, seed: u64, moment: &Moment) -> Choice {
-    let table = case.setup.table;
+    let table = &case.setup.table;
     let Some(Some(action)) = case.script.steps.get(moment.step) else {
-        return case.script.choose(table, moment);
+        return case.script.choose(moment);
     };
     let parameters = &table.space().actions[table.rows()[action.row].action].parameters;
     let is_speed =
@@ -94,7 +94,7 @@ fn choose(case: &Case, seed: u64, moment: &Moment) -> Choice {
             return Choice::Act(draw);
         }
     }
-    case.script.choose(table, moment)
+    case.script.choose(moment)
 }
 
 /// Standard normal, no farther out than [`CUT`].

@@ -1,9 +1,11 @@
 //! The claims of an emitted scenario against what a replay finds.
 
+use std::fmt::Display;
+
 use crate::episode::{Breach, Collision, EpisodeLog};
 use avastra_drivers::Module;
 use avastra_lang::model::vocabulary::Word;
-use avastra_lang::model::{Claim, Obstacle, Scenario, Space, digest_text};
+use avastra_lang::model::{Claim, Figure, Obstacle, Scenario, Space, digest_text};
 
 use super::avoidable::Judgement;
 use super::case::Found;
@@ -59,166 +61,177 @@ pub fn verify(
     replays: &Replays,
 ) -> Vec<ClaimResult> {
     let steps = log.refused().map(|(number, reason)| judged(format!("step {number} is legal"), Err(reason)));
-    let claims = scenario.claims.iter().map(|claim| check(space, claim, log, judgements, replays));
-    steps.chain(claims).collect()
+    let played = Played { space, log, judgements, replays };
+    steps.chain(scenario.claims.iter().map(|claim| played.check(claim))).collect()
 }
 
-fn check(
-    space: &Space,
-    claim: &Claim,
-    log: &EpisodeLog,
-    judgements: &[Judgement],
-    replays: &Replays,
-) -> ClaimResult {
-    match claim {
-        Claim::Collision { obstacle, time } => {
-            let at = time.as_ref().map_or(String::new(), |time| format!(" at {time}"));
-            let outcome = collision(log, *obstacle).and_then(|index| match time {
-                Some(claimed) if !claimed.rounds(log.collisions[index].contact.time_s) => {
-                    Err(format!("at {:.2} s", log.collisions[index].contact.time_s))
-                }
-                _ => Ok(()),
-            });
-            judged(format!("collision{}{at}", with(*obstacle)), outcome)
-        }
-        Claim::Verdict { name, obstacle } => {
-            let judge = |index: usize| {
-                let facts = facts(log, index, &judgements[index]);
-                match space.verdict(name, facts, log.memory_after(log.collisions[index].step)) {
-                    Some(true) => Ok(()),
-                    _ => Err(format!(
-                        "repeated: {}, sudden: {}, struck: {}, priority: {}, {}",
-                        facts.repeated,
-                        facts.sudden,
-                        facts.struck,
-                        facts.priority.name(),
-                        in_words(&judgements[index])
-                    )),
-                }
-            };
-            judged(format!("{name}{}", with(*obstacle)), collision(log, *obstacle).and_then(judge))
-        }
-        Claim::Breach { requirement, time } => {
-            let at = time.as_ref().map_or(String::new(), |time| format!(" at {time}"));
-            let outcome = match (log.breach_of(space, requirement), time) {
-                (None, _) => Err(NO_BREACH.to_owned()),
-                (Some(breach), Some(claimed)) if !claimed.rounds(breach.time_s) => {
-                    Err(format!("at {:.2} s", breach.time_s))
-                }
-                (Some(_), _) => Ok(()),
-            };
-            judged(format!("{requirement}.breached{at}"), outcome)
-        }
-        Claim::Kept { requirement, by } => {
-            let is_meant = |found: &&Breached| space.requirements[found.requirement].name == *requirement;
-            let claim = format!("{requirement}.kept by [{}]", by.join(", "));
-            let Some(found) = (replays.breached)() else {
-                return ClaimResult { claim, confirmed: None, found: "not tried".to_owned() };
-            };
-            match found.iter().find(is_meant) {
-                None => judged(claim, Err(NO_BREACH.to_owned())),
-                Some(found) if found.kept_by == *by => judged(claim, Ok(())),
-                Some(found) => judged(claim, Err(format!("kept by [{}]", found.kept_by.join(", ")))),
+/// What claims are held against.
+#[derive(Clone, Copy)]
+struct Played<'a> {
+    space: &'a Space,
+    log: &'a EpisodeLog,
+    judgements: &'a [Judgement],
+    replays: &'a Replays<'a>,
+}
+
+impl Played<'_> {
+    fn check(self, claim: &Claim) -> ClaimResult {
+        let Played { space, log, judgements, replays } = self;
+        match claim {
+            Claim::Collision { obstacle, time } => {
+                let outcome = self.collision(*obstacle).and_then(|index| match time {
+                    Some(claimed) if !claimed.rounds(log.collisions[index].contact.time_s) => {
+                        Err(format!("at {:.2} s", log.collisions[index].contact.time_s))
+                    }
+                    _ => Ok(()),
+                });
+                judged(format!("collision{}{}", with(*obstacle), at(time.as_ref())), outcome)
             }
-        }
-        Claim::Avoidability { class, by, obstacle } => {
-            let judge = |index: usize| {
-                let found = &judgements[index];
-                let same_drivers = by.as_ref().is_none_or(|by| *by == found.avoided_by);
-                if *class == found.class && same_drivers { Ok(()) } else { Err(in_words(found)) }
-            };
-            let claim = format!("{}{}{}", class.name(), by_whom(by.as_deref()), with(*obstacle));
-            judged(claim, collision(log, *obstacle).and_then(judge))
-        }
-        Claim::Cause { modules, obstacle } => {
-            let judge = |index: usize| {
-                let found = (replays.cause)(index).map_err(|error| error.to_string())?;
-                let found: Vec<&str> = found.into_iter().map(Module::name).collect();
-                let same = modules.iter().map(String::as_str).eq(found.iter().copied());
-                if same { Ok(()) } else { Err(format!("[{}]", found.join(", "))) }
-            };
-            let claim = format!("cause [{}]{}", modules.join(", "), with(*obstacle));
-            judged(claim, collision(log, *obstacle).and_then(judge))
-        }
-        Claim::Priority { priority, obstacle } => {
-            let judge = |index: usize| match log.collisions[index].contact.priority {
-                found if found == *priority => Ok(()),
-                found => Err(format!("priority {}", found.name())),
-            };
-            let claim = format!("priority {}{}", priority.name(), with(*obstacle));
-            judged(claim, collision(log, *obstacle).and_then(judge))
-        }
-        Claim::Recurrence { requirement, obstacle, recurred, replays: wanted } => {
-            let of = requirement.as_ref().map_or_else(String::new, |name| format!("{name}."));
-            let claim = format!("{of}recurrence {recurred} of {wanted}{}", with(*obstacle));
-            let found = match requirement {
-                None => collision(log, *obstacle).map(Found::Collision),
-                Some(name) => {
-                    let is_meant = |breach: &Breach| space.requirements[breach.requirement].name == *name;
-                    let first = log.breaches.iter().position(is_meant);
-                    first.map(Found::Breach).ok_or_else(|| NO_BREACH.to_owned())
-                }
-            };
-            match found.map(|found| (replays.recurrence)(found, *wanted)) {
-                Err(none) => judged(claim, Err(none)),
-                Ok(Ok(found)) if found.recurred == *recurred => judged(claim, Ok(())),
-                Ok(Ok(found)) => judged(claim, Err(found.to_string())),
-                Ok(Err(no_tries)) => ClaimResult { claim, confirmed: None, found: no_tries.to_string() },
+            Claim::Verdict { name, obstacle } => {
+                let outcome = self.collision(*obstacle).and_then(|index| self.has_verdict(name, index));
+                judged(format!("{name}{}", with(*obstacle)), outcome)
             }
-        }
-        Claim::Minimal { obstacle } => {
-            let claim = format!("minimal{}", with(*obstacle));
-            let spare = match collision(log, *obstacle) {
-                Ok(index) => (replays.spare_steps)(index),
-                Err(found) => return judged(claim, Err(found)),
-            };
-            match spare {
-                Ok(spare) if spare.is_empty() => judged(claim, Ok(())),
-                Ok(spare) => {
-                    let spare: Vec<String> = spare.iter().map(usize::to_string).collect();
-                    let found = format!("the same crash without step {}", spare.join(", or without step "));
-                    judged(claim, Err(found))
-                }
-                Err(no_tries) => ClaimResult { claim, confirmed: None, found: no_tries.to_string() },
+            Claim::Breach { requirement, time } => {
+                let outcome = match (log.breach_of(space, requirement), time) {
+                    (None, _) => Err(NO_BREACH.to_owned()),
+                    (Some(breach), Some(claimed)) if !claimed.rounds(breach.time_s) => {
+                        Err(format!("at {:.2} s", breach.time_s))
+                    }
+                    (Some(_), _) => Ok(()),
+                };
+                judged(format!("{requirement}.breached{}", at(time.as_ref())), outcome)
             }
-        }
-        Claim::Proc(claimed) => {
-            let found: Vec<f64> = log.steps.iter().map(|step| step.proc).collect();
-            let fits = claimed.len() == found.len()
-                && claimed.iter().zip(&found).all(|(claimed, found)| claimed.rounds(*found));
-            let shown: Vec<String> = found.iter().map(|proc| format!("{proc:.3}")).collect();
-            let result = if fits { Ok(()) } else { Err(format!("[{}]", shown.join(", "))) };
-            judged("collision probability of each step".to_owned(), result)
-        }
-        Claim::Trace(claimed) => {
-            let found = digest_text(&log.trace());
-            let result = if &found == claimed { Ok(()) } else { Err(found) };
-            judged("trace of the whole state".to_owned(), result)
-        }
-        Claim::End(claimed) => {
-            let found = log.end.name();
-            let result = if found == claimed { Ok(()) } else { Err(found.to_owned()) };
-            judged(format!("end {claimed}"), result)
+            Claim::Kept { requirement, by } => {
+                let claim = format!("{requirement}.kept by [{}]", by.join(", "));
+                let Some(found) = (replays.breached)() else { return untried(claim, "not tried") };
+                let is_meant = |found: &&Breached| space.requirements[found.requirement].name == *requirement;
+                match found.iter().find(is_meant) {
+                    None => judged(claim, Err(NO_BREACH.to_owned())),
+                    Some(found) if found.kept_by == *by => judged(claim, Ok(())),
+                    Some(found) => judged(claim, Err(format!("kept by [{}]", found.kept_by.join(", ")))),
+                }
+            }
+            Claim::Avoidability { class, by, obstacle } => {
+                let judge = |index: usize| {
+                    let found = &judgements[index];
+                    let same_drivers = by.as_ref().is_none_or(|by| *by == found.avoided_by);
+                    if *class == found.class && same_drivers { Ok(()) } else { Err(in_words(found)) }
+                };
+                let claim = format!("{}{}{}", class.name(), by_whom(by.as_deref()), with(*obstacle));
+                judged(claim, self.collision(*obstacle).and_then(judge))
+            }
+            Claim::Cause { modules, obstacle } => {
+                let judge = |index: usize| {
+                    let found = (replays.cause)(index).map_err(|error| error.to_string())?;
+                    let found: Vec<&str> = found.into_iter().map(Module::name).collect();
+                    let same = modules.iter().map(String::as_str).eq(found.iter().copied());
+                    if same { Ok(()) } else { Err(format!("[{}]", found.join(", "))) }
+                };
+                let claim = format!("cause [{}]{}", modules.join(", "), with(*obstacle));
+                judged(claim, self.collision(*obstacle).and_then(judge))
+            }
+            Claim::Priority { priority, obstacle } => {
+                let judge = |index: usize| match log.collisions[index].contact.priority {
+                    found if found == *priority => Ok(()),
+                    found => Err(format!("priority {}", found.name())),
+                };
+                let claim = format!("priority {}{}", priority.name(), with(*obstacle));
+                judged(claim, self.collision(*obstacle).and_then(judge))
+            }
+            Claim::Recurrence { requirement, obstacle, recurred, replays: wanted } => {
+                let of = requirement.as_ref().map_or_else(String::new, |name| format!("{name}."));
+                let claim = format!("{of}recurrence {recurred} of {wanted}{}", with(*obstacle));
+                let found = self.finding(requirement.as_deref(), *obstacle);
+                match found.map(|found| (replays.recurrence)(found, *wanted)) {
+                    Err(none) => judged(claim, Err(none)),
+                    Ok(Ok(found)) if found.recurred == *recurred => judged(claim, Ok(())),
+                    Ok(Ok(found)) => judged(claim, Err(found.to_string())),
+                    Ok(Err(no_tries)) => untried(claim, no_tries),
+                }
+            }
+            Claim::Minimal { obstacle } => {
+                let claim = format!("minimal{}", with(*obstacle));
+                match self.collision(*obstacle).map(|index| (replays.spare_steps)(index)) {
+                    Err(none) => judged(claim, Err(none)),
+                    Ok(Ok(spare)) if spare.is_empty() => judged(claim, Ok(())),
+                    Ok(Ok(spare)) => {
+                        let spare: Vec<String> = spare.iter().map(usize::to_string).collect();
+                        let found =
+                            format!("the same crash without step {}", spare.join(", or without step "));
+                        judged(claim, Err(found))
+                    }
+                    Ok(Err(no_tries)) => untried(claim, no_tries),
+                }
+            }
+            Claim::Proc(claimed) => {
+                let found: Vec<f64> = log.steps.iter().map(|step| step.proc).collect();
+                let fits = claimed.len() == found.len()
+                    && claimed.iter().zip(&found).all(|(claimed, found)| claimed.rounds(*found));
+                let shown: Vec<String> = found.iter().map(|proc| format!("{proc:.3}")).collect();
+                let result = if fits { Ok(()) } else { Err(format!("[{}]", shown.join(", "))) };
+                judged("collision probability of each step".to_owned(), result)
+            }
+            Claim::Trace(claimed) => {
+                let found = digest_text(&log.trace());
+                let result = if &found == claimed { Ok(()) } else { Err(found) };
+                judged("trace of the whole state".to_owned(), result)
+            }
+            Claim::End(claimed) => {
+                let found = log.end.name();
+                let result = if found == claimed { Ok(()) } else { Err(found.to_owned()) };
+                judged(format!("end {claimed}"), result)
+            }
         }
     }
-}
 
-/// The first collision with an obstacle, or with any obstacle.
-fn collision(log: &EpisodeLog, obstacle: Option<Obstacle>) -> Result<usize, String> {
-    let meant =
-        |collision: &Collision| obstacle.is_none_or(|wanted| collision.contact.obstacle == wanted.number);
-    let index = log.collisions.iter().position(meant).ok_or_else(|| "no such collision".to_owned())?;
-    let body = log.collisions[index].body.like;
-    match obstacle {
-        Some(wanted) if !wanted.kind.fits(body.is_vehicle()) => {
-            Err(format!("npc#{} is a {}", wanted.number, body.name()))
+    /// The first collision with an obstacle, or with any obstacle.
+    fn collision(self, obstacle: Option<Obstacle>) -> Result<usize, String> {
+        let meant =
+            |collision: &Collision| obstacle.is_none_or(|wanted| collision.contact.obstacle == wanted.number);
+        let collisions = &self.log.collisions;
+        let index = collisions.iter().position(meant).ok_or_else(|| "no such collision".to_owned())?;
+        let body = collisions[index].body.like;
+        match obstacle {
+            Some(wanted) if !wanted.kind.fits(body.is_vehicle()) => {
+                Err(format!("npc#{} is a {}", wanted.number, body.name()))
+            }
+            _ => Ok(index),
         }
-        _ => Ok(index),
+    }
+
+    /// The first breach of a requirement, or without one the first collision with an obstacle.
+    fn finding(self, requirement: Option<&str>, obstacle: Option<Obstacle>) -> Result<Found, String> {
+        let Some(name) = requirement else { return self.collision(obstacle).map(Found::Collision) };
+        let is_meant = |breach: &Breach| self.space.requirements[breach.requirement].name == name;
+        let first = self.log.breaches.iter().position(is_meant);
+        first.map(Found::Breach).ok_or_else(|| NO_BREACH.to_owned())
+    }
+
+    /// Whether a collision has a verdict of the space.
+    fn has_verdict(self, name: &str, index: usize) -> Result<(), String> {
+        let judgement = &self.judgements[index];
+        let facts = facts(self.log, index, judgement);
+        match self.space.verdict(name, facts, self.log.memory_after(self.log.collisions[index].step)) {
+            Some(true) => Ok(()),
+            _ => Err(format!(
+                "repeated: {}, sudden: {}, struck: {}, priority: {}, {}",
+                facts.repeated,
+                facts.sudden,
+                facts.struck,
+                facts.priority.name(),
+                in_words(judgement)
+            )),
+        }
     }
 }
 
 fn with(obstacle: Option<Obstacle>) -> String {
     obstacle.map_or(String::new(), |obstacle| format!(" with {obstacle}"))
+}
+
+/// When it is claimed to be.
+fn at(time: Option<&Figure>) -> String {
+    time.map_or(String::new(), |time| format!(" at {time}"))
 }
 
 /// The class of a collision and the reference drivers that avoid it.
@@ -228,6 +241,10 @@ fn in_words(judgement: &Judgement) -> String {
 
 fn by_whom(drivers: Option<&[String]>) -> String {
     drivers.map_or(String::new(), |drivers| format!(" by [{}]", drivers.join(", ")))
+}
+
+fn untried(claim: String, why: impl Display) -> ClaimResult {
+    ClaimResult { claim, confirmed: None, found: why.to_string() }
 }
 
 fn judged(claim: String, found: Result<(), String>) -> ClaimResult {

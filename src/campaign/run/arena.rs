@@ -26,7 +26,7 @@ use crate::run::summary::EpisodeSummary;
 /// Everything that the episodes of a run or a training share.
 pub struct Arena {
     table: ActionTable,
-    rules: RulesInForce,
+    rules: Arc<RulesInForce>,
     ads: Selected,
     traffic: TrafficProfile,
     /// Index of each road in the space, with its scene.
@@ -62,7 +62,7 @@ impl Arena {
                 prove::lasts(space, &space.roads[*index], &rules)?;
             }
         }
-        Ok(Arena { table, rules, ads, traffic: TrafficProfile::default(), roads })
+        Ok(Arena { table, rules: Arc::new(rules), ads, traffic: TrafficProfile::default(), roads })
     }
 
     /// The same arena, in which other vehicles drive by another profile.
@@ -107,7 +107,7 @@ impl Arena {
     /// row is taken, and its refusals are told.
     pub fn rows_on_roads(&self) -> Vec<(usize, usize)> {
         let space = self.table.space();
-        let is_usual = self.rules == RulesInForce::by_default(space);
+        let is_usual = *self.rules == RulesInForce::by_default(space);
         let runs = |row: &Row, road: usize| !is_usual || matches!(row.roads[road], Reach::Open(_));
         let roads = self.roads.iter().enumerate();
         roads
@@ -124,17 +124,17 @@ impl Arena {
     }
 
     /// An episode of a seed on the nth of the roads.
-    pub fn setup(&self, road: usize, seed: u64) -> episode::Setup<'_> {
+    pub fn setup(&self, road: usize, seed: u64) -> episode::Setup {
         let (index, scene) = &self.roads[road];
         let space = self.table.space();
         let road = &space.roads[*index];
         let memory = space.memory_at_start(road, &self.rules, seed);
         let memory = memory.expect("the arena was made with a start on each road");
         episode::Setup {
-            table: &self.table,
-            road,
+            table: self.table.clone(),
+            road: *index,
             scene: scene.clone(),
-            rules: &self.rules,
+            rules: self.rules.clone(),
             ads: self.ads.clone(),
             seed,
             start: Start { traffic: self.traffic, ..Start::drawn(space, road, &memory, seed) },
@@ -165,7 +165,7 @@ pub fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) 
         return (carry_out(offers, legal.view(), agent, moment), legal);
     }
     let situation = situation(agent, moment);
-    let table = moment.setup().table;
+    let table = &moment.setup().table;
     let offer = |row| table.offer(&situation, row);
     let all = Array1::from_elem(table.rows().len(), true);
     if !(0..all.len()).any(|row| offer(row).is_ok()) {
@@ -178,7 +178,7 @@ pub fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) 
 
 /// Lets an agent choose that asks for a few rows alone. What became of the first one is noted.
 pub(crate) fn choose_only(agent: &mut dyn Agent, moment: &Moment, offered: &mut Offered) -> Choice {
-    let table = moment.setup().table;
+    let table = &moment.setup().table;
     let situation = situation(agent, moment);
     let rows = agent.only().to_vec();
     let mut legal = Array1::from_elem(table.rows().len(), false);

@@ -174,7 +174,7 @@ impl Run {
     }
 
     /// Everything that the nth episode is made of but the choices.
-    pub fn setup(&self, number: usize) -> episode::Setup<'_> {
+    pub fn setup(&self, number: usize) -> episode::Setup {
         let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
         let block = number / self.settings.episodes as usize;
         self.setup_of(self.plan.get(block).map_or(block, |(road, _)| *road), seed)
@@ -187,7 +187,7 @@ impl Run {
     }
 
     /// An episode of any seed on the nth of the roads.
-    pub fn setup_of(&self, road: usize, seed: u64) -> episode::Setup<'_> {
+    pub fn setup_of(&self, road: usize, seed: u64) -> episode::Setup {
         let mut setup = self.arena.setup(road, seed);
         setup.start.ambient = self.settings.ambient;
         setup

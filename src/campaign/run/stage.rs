@@ -18,9 +18,9 @@ use crate::run::settings::RunError;
 
 /// A scenario that is ready to play: its road and the rules that it was made with.
 pub struct Stage<'a> {
-    table: &'a ActionTable,
+    table: ActionTable,
     scenario: &'a Scenario,
-    rules: RulesInForce,
+    rules: Arc<RulesInForce>,
     scene: Arc<Scene>,
     traffic: TrafficProfile,
 }
@@ -28,7 +28,7 @@ pub struct Stage<'a> {
 impl<'a> Stage<'a> {
     /// # Errors
     /// If the scenario was made in another world, or with rules or traffic that do not exist.
-    pub fn new(table: &'a ActionTable, scenario: &'a Scenario) -> Result<Stage<'a>, RunError> {
+    pub fn new(table: &ActionTable, scenario: &'a Scenario) -> Result<Stage<'a>, RunError> {
         let origin = &scenario.origin;
         if let Some(engine) = origin.engine.as_ref().filter(|engine| engine.as_str() != ENGINE) {
             return Err(RunError::Engine { scenario: scenario.name.clone(), engine: engine.clone() });
@@ -36,20 +36,20 @@ impl<'a> Stage<'a> {
         let rules = RulesInForce::new(table.space(), &origin.with, &origin.without)?;
         let scene = Arc::new(Scene::of(&table.space().roads[scenario.road]));
         let traffic = recorded_traffic(scenario)?;
-        Ok(Stage { table, scenario, rules, scene, traffic })
+        Ok(Stage { table: table.clone(), scenario, rules: Arc::new(rules), scene, traffic })
     }
 
     /// The beginning of its episode, with any driving system.
-    pub fn setup(&self, ads: &Selected) -> episode::Setup<'_> {
+    pub fn setup(&self, ads: &Selected) -> episode::Setup {
         let space = self.table.space();
         let start = &self.scenario.start;
         let seed = self.scenario.origin.seed.unwrap_or(0);
         let memory = start.memory.clone();
         episode::Setup {
-            table: self.table,
-            road: &space.roads[self.scenario.road],
+            table: self.table.clone(),
+            road: self.scenario.road,
             scene: self.scene.clone(),
-            rules: &self.rules,
+            rules: self.rules.clone(),
             ads: ads.clone(),
             seed,
             start: Start {
@@ -69,7 +69,7 @@ impl<'a> Stage<'a> {
     /// Plays it as it is written down.
     pub fn play(&self, ads: &Selected, watch: &mut Watch) -> EpisodeLog {
         let script = Script::of_scenario(self.scenario);
-        episode::run_watched(&self.setup(ads), &mut |moment| script.choose(self.table, moment), watch)
+        episode::run_watched(&self.setup(ads), &mut |moment| script.choose(moment), watch)
     }
 
     /// Plays it, and finds its first counted collision, if there is one.

@@ -4,25 +4,19 @@
 //! does not hold for agents that also choose the values of a row (`space-filling` and the searches), nor for policies
 //! with an observation period of their own.
 
-use std::sync::Arc;
-
 use ndarray::Array1;
 
-use crate::episode::{Choice, Collision, End, EpisodeLog, Play, StepLog};
+use crate::episode::{Choice, Collision, End, EpisodeLog, Moment, Play, Setup, StepLog};
 use avastra_search::mdp;
 use avastra_search::mdp::{Observation, RewardSettings, StepOutcome};
 use avastra_world::action::Offer;
 
 use crate::run::arena::legal;
-use crate::run::play::Run;
 use crate::run::summary::{EpisodeSummary, Finding};
 
 /// An episode under way. A clone goes on exactly as the original would: it is a snapshot and a branch.
 #[derive(Clone)]
 pub struct Stepped {
-    run: Arc<Run>,
-    road: usize,
-    seed: u64,
     play: Play,
     observation: Observation,
     /// One for each row, at this moment.
@@ -42,19 +36,18 @@ pub enum StepError {
 }
 
 impl Stepped {
-    /// An episode of a seed on the nth road of a run, before its first step. The run's agent is not asked. If an
-    /// external driving system fails at the beginning, the episode has ended already.
-    pub fn new(run: Arc<Run>, road: usize, seed: u64) -> Stepped {
-        let play = Play::new(&run.setup_of(road, seed));
+    /// An episode before its first step. If an external driving system fails at the beginning, it has ended already.
+    pub fn new(setup: &Setup) -> Stepped {
+        let play = Play::new(setup);
         let observation = play.observation();
         let (offers, findings) = (Vec::new(), Vec::new());
-        let mut begun = Stepped { run, road, seed, play, observation, offers, end: None, findings };
+        let mut begun = Stepped { play, observation, offers, end: None, findings };
         begun.look();
         begun
     }
 
     pub fn seed(&self) -> u64 {
-        self.seed
+        self.play.setup().seed
     }
 
     /// What an agent sees now.
@@ -95,10 +88,8 @@ impl Stepped {
             Some(row) => Choice::of(row, offers.swap_remove(row)),
             None => Choice::Pass,
         };
-        let run = Arc::clone(&self.run);
-        let setup = run.setup_of(self.road, self.seed);
         let observation = std::mem::replace(&mut self.observation, Observation::zeros());
-        self.end = self.play.step(&setup, observation, choice, &mut |_, _, _| {});
+        self.end = self.play.step(observation, choice, &mut |_, _, _| {});
         self.look();
         Ok(())
     }
@@ -111,7 +102,7 @@ impl Stepped {
         if let Some(end) = self.end {
             return Err(StepError::Over { end: end.name() });
         }
-        let rows = self.run.table().rows().len();
+        let rows = self.play.setup().table.rows().len();
         match row.filter(|row| *row >= rows) {
             Some(row) => Err(StepError::Row { row, last: rows - 1 }),
             None => Ok(()),
@@ -122,10 +113,7 @@ impl Stepped {
     /// change any more; each costs a replay of the episode and several of its last seconds.
     pub fn findings(&mut self) -> &[Finding] {
         if self.findings.len() < self.play.collisions().len() {
-            let setup = self.run.setup_of(self.road, self.seed);
-            let log = self.play.clone().into_log(&setup, self.end.unwrap_or(End::Script));
-            let judged = EpisodeSummary::judged(&setup, 0, &log);
-            self.findings = judged.collisions;
+            self.findings = EpisodeSummary::judged(self.play.setup(), 0, &self.log()).collisions;
         }
         &self.findings
     }
@@ -142,14 +130,11 @@ impl Stepped {
 
     /// The log of the episode up to now.
     pub fn log(&self) -> EpisodeLog {
-        let setup = self.run.setup_of(self.road, self.seed);
-        self.play.clone().into_log(&setup, self.end.unwrap_or(End::Script))
+        self.play.clone().into_log(self.end.unwrap_or(End::Script))
     }
 
     /// Looks about after a step. After the last one, too: a learner wants to know what it would have seen next.
     fn look(&mut self) {
-        let run = Arc::clone(&self.run);
-        let setup = run.setup_of(self.road, self.seed);
         match self.end.map_or_else(|| self.play.look(), Err) {
             Ok(observation) => self.observation = observation,
             Err(end) => {
@@ -157,18 +142,19 @@ impl Stepped {
                 self.observation = self.play.observation();
             }
         }
-        let offers = |moment: &crate::episode::Moment| setup.table.offers(moment.situation);
-        self.offers = self.play.at(&setup, &self.observation, offers);
+        let offers = |moment: &Moment| moment.setup().table.offers(moment.situation);
+        self.offers = self.play.at(&self.observation, offers);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use std::path::Path;
+    use std::sync::Arc;
 
     use super::*;
     use crate::episode::Outcome;
-    use crate::run::RunSettings;
+    use crate::run::{Run, RunSettings};
     use avastra_lang::check::{ReadError, load};
     use avastra_world::action::ActionTable;
 
@@ -196,7 +182,7 @@ mod tests {
     /// Chooses the rows of an episode of a run again, and goes on from a branch, too. Number of its collisions.
     fn replayed(run: &Arc<Run>, number: usize) -> usize {
         let (summary, log) = run.judged(number);
-        let mut stepped = Stepped::new(Arc::clone(run), 0, log.seed);
+        let mut stepped = Stepped::new(&run.setup_of(0, log.seed));
         let mut branch = None;
         for (index, step) in log.steps.iter().enumerate() {
             if index == 2 {
@@ -228,7 +214,7 @@ mod tests {
 
     #[test]
     fn a_refused_row_loses_the_step() {
-        let mut stepped = Stepped::new(run("idm"), 0, 1);
+        let mut stepped = Stepped::new(&run("idm").setup_of(0, 1));
         let rows = stepped.legal().len();
         assert_eq!(stepped.step(Some(rows)), Err(StepError::Row { row: rows, last: rows - 1 }));
         let refused =

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use ndarray::Array1;
 
 use crate::episode;
-use crate::episode::{Choice, End, EpisodeLog, Moment, Script, Setup};
+use crate::episode::{Choice, End, EpisodeLog, Moment, Play, Script, Setup};
 use crate::oracle;
 use crate::run::{
     Arena, EpisodeSummary, Finding, Profile, RunError, RunSettings, TrafficRecord, agent_named,
@@ -217,7 +217,7 @@ impl Training {
         let mut setup = self.arena.setup(road.expect("it was played here"), log.seed);
         setup.start = log.start;
         let script = Script::of_log(log);
-        let again = episode::run(&setup, &mut |moment| script.choose(setup.table, moment));
+        let again = episode::run(&setup, &mut |moment| script.choose(moment));
         EpisodeLog { end: log.end, ..again }
     }
 }
@@ -255,14 +255,14 @@ fn play(setup: &Setup, agent: &mut dyn Trainable, settings: &TrainSettings) -> U
         }
     };
     let mut at_last = |moment: &Moment| {
-        let table = moment.setup().table;
+        let table = &moment.setup().table;
         let legal = match looks_at_mask {
             true => legal(&table.offers(moment.situation)),
             false => Array1::from_elem(table.rows().len(), true),
         };
         last = Some((moment.observation.clone(), legal));
     };
-    let log = episode::run_from(setup, None, &mut make_choice, &mut watch, &mut at_last);
+    let log = episode::run_from(Play::new(setup), &mut make_choice, &mut watch, &mut at_last);
     Unjudged { log, choices, last, closeness }
 }
 

@@ -13,7 +13,7 @@ use avastra_lang::model::body::parameters;
 use avastra_lang::model::command::{Command, IgnoredRules};
 use avastra_lang::model::vocabulary::{Body, Phenomenon, ShownLights, TrajectoryField, Verb, Word};
 use avastra_lang::model::{
-    BodyDef, LightProgram, Memory, Road, SPAWN_SPEED_MPS, Scenario, Space, TrajectoryDef, ticks_s,
+    BodyDef, Memory, Road, SPAWN_SPEED_MPS, Scenario, SignalProgram, Space, TrajectoryDef, ticks_s,
 };
 use avastra_lang::syntax::ast::{ExprKind, Field, ItemKind};
 use avastra_lang::syntax::print_item;
@@ -259,7 +259,7 @@ fn road_text(road: &Road, name: &str) -> Option<String> {
     if let Some(phase_s) = road.signal_phase_s {
         let _ = write!(text, ", signal_phase: {} s", decimal(phase_s, false));
     }
-    let LightProgram { green_s, yellow_s, all_red_s } = road.lights;
+    let SignalProgram { green_s, yellow_s, all_red_s } = road.signal_program;
     for (name, time_s) in [("green", green_s), ("yellow", yellow_s), ("all_red", all_red_s)] {
         time_s.iter().for_each(|time_s| text += &format!(", {name}: {} s", decimal(*time_s, false)));
     }

@@ -4,9 +4,9 @@ use avastra_lang::model::SPAWN_SPEED_MPS;
 use avastra_road::LanePlace;
 
 use super::across::aside_fields;
-use super::action::{Act, ActKind, Aside};
+use super::action::{Act, ActKind, Aside, Way};
 use super::condition::Waiting;
-use super::order::{is_aside, is_speed};
+use super::order::{Sequence, is_aside, is_speed};
 use super::pace::{self, PACE, too_fast};
 use super::said::Said;
 use super::scene::{Cast, Moving};
@@ -23,6 +23,9 @@ pub const ARRIVES_M: f64 = 0.05;
 
 const TIMES_LATER: &str =
     "it moves, and its trajectory has times only from later on: where it is until then is not known";
+
+const BESIDE_TIMES: &str =
+    "beside the times of a trajectory or of a profile only what waits for their end is read";
 
 /// A speed that is asked anew at every tick.
 pub const CONTINUOUS: &str = "continuous: true";
@@ -41,166 +44,215 @@ pub struct Told {
     pub then: Option<Said>,
 }
 
+/// The phases of somebody, as far as they are written.
+struct Script<'c, 'a, 'e> {
+    cast: &'c Cast<'a>,
+    moving: &'c Moving<'a>,
+    sequence: Sequence<'e>,
+    told: Told,
+    phases: Vec<Said>,
+    /// What the last phases do, if it takes a while: what may follow.
+    takes: Option<Takes>,
+}
+
+impl<'c, 'a, 'e> Script<'c, 'a, 'e> {
+    fn new(cast: &'c Cast<'a>, moving: &'c Moving<'a>, sequence: Sequence<'e>) -> Script<'c, 'a, 'e> {
+        let lane = moving.placed.lane;
+        let told = Told {
+            mps: Some(moving.mps),
+            offset_m: moving.offset_m,
+            at_m: moving.at_m,
+            lane,
+            lane_m: lane.map_or(0.0, |lane| cast.aside_m(moving, moving.at_m, lane)),
+            then: None,
+        };
+        Script { cast, moving, sequence, told, phases: Vec::new(), takes: None }
+    }
+
+    /// The times of the trajectory on which it begins.
+    fn on_its_way(&mut self, source: &mut Source) -> Option<()> {
+        let (cast, moving) = (self.cast, self.moving);
+        let Some(way) = &moving.entity.way else { return Some(()) };
+        let leg = moving.leg(way)?;
+        if way.timing.is_some() {
+            let (timed, then) = cast.timed(source, moving, &leg.timed, Said::default(), true)?;
+            let waits = leg.timed.first().is_some_and(|(_, first_s)| *first_s > 0.0) && moving.mps > 0.0;
+            source.refuse_if(waits, &moving.entity.mark, TIMES_LATER)?;
+            self.phases.extend(timed);
+            self.takes = Some(Takes { then: vec![then], is_cut_short: false });
+        }
+        cast.told_at_the_end(moving, leg, &mut self.told);
+        Some(())
+    }
+
+    /// The words before the phase of an event, behind the phases that wait for what it waits for. `before` are the events of the
+    /// moment before it.
+    fn begins(&mut self, source: &mut Source, event: &Event, before: &[&Event]) -> Option<Said> {
+        let rises = |one: &Condition| matches!(one.edge, Edge::None | Edge::Rising);
+        let is_first = matches!(event.when.as_slice(), [all] if all.len() == 1 && all.iter().all(rises))
+            && before.iter().all(|event| event.when.is_empty());
+        let waiting = Waiting { cast: self.cast, actor: self.moving, before: before.to_vec(), is_first };
+        let begins = waiting.begins(source, &event.when)?;
+        let is_endless = self.phases.last().is_some_and(|phase| phase.holds(CONTINUOUS));
+        let waits = begins.once.is_some() && !begins.is_after;
+        let never = "what comes after a speed or a distance that is kept waits for the end of that, which never comes";
+        source.refuse_if(is_endless && !waits, &event.mark, never)?;
+        if let Some(Takes { then, is_cut_short }) = self.takes.take() {
+            let waits = match is_cut_short {
+                true => waiting.waits_for_a_way(&event.when),
+                false => waiting.waits_for_the_end(&event.when),
+            };
+            source.refuse_if(!waits && !is_cut_short, &event.mark, BESIDE_TIMES)?;
+            if waits {
+                let then = then.into_iter().filter(|then| !then.0.is_empty());
+                self.phases.extend(then.map(|then| then.and("{}")));
+            }
+        }
+        if begins.is_after {
+            self.phases.push(Said::text("after 0 s {}"));
+        }
+        let first = begins.first.as_ref();
+        self.phases.extend(first.map(|first| Said::text("once ").then(first.clone()).and(" {}")));
+        Some(begins.said())
+    }
+
+    /// The phases of what begins at one moment, which `begins` says.
+    fn together(
+        &mut self,
+        source: &mut Source,
+        event: Option<&Event>,
+        begins: Said,
+        acts: &[&Act],
+    ) -> Option<()> {
+        let mut fields = match event {
+            Some(event) => self.ended(source, event)?,
+            None => Vec::new(),
+        };
+        go_together(source, acts, &self.told)?;
+        let mut timed = Vec::new();
+        let mut takes: Option<Takes> = None;
+        for act in acts {
+            match &act.kind {
+                ActKind::Keep(kept) if !kept.is_continuous => {
+                    let (_, too_far) = self.cast.too_far(source, self.moving, &act.mark, kept)?;
+                    let near = Said::text("once ").then(too_far.clone()).and(" <= ").number(KEPT_M, "m");
+                    let near = near.and(" and ").then(too_far).and(" >= ").number(-KEPT_M, "m");
+                    self.cast.fields(source, self.moving, act, &mut self.told, &mut fields)?;
+                    self.told.then = Some(near.and(" { speed: npc.speed }"));
+                }
+                ActKind::Follow(way) => {
+                    let then = self.follow(source, act, way, &begins, &mut timed)?;
+                    Takes::add(&mut takes, then, way.timing.is_none());
+                }
+                ActKind::Profile(entries) => {
+                    let reason = "its trajectory has times, which say the speed already";
+                    let has_times = self.moving.legs.iter().any(|leg| !leg.timed.is_empty());
+                    source.refuse_if(has_times, &act.mark, reason)?;
+                    let then;
+                    (timed, then) = pace::profile(source, &act.mark, self.told.mps, entries, begins.clone())?;
+                    Takes::add(&mut takes, then, false);
+                    self.told.mps = entries.last().map(|entry| entry.mps);
+                }
+                _ => self.cast.fields(source, self.moving, act, &mut self.told, &mut fields)?,
+            }
+        }
+        self.takes = takes.or(self.takes.take());
+        if timed.is_empty() {
+            // A phase that waits for nothing and tells nothing is none.
+            if !(begins.0.is_empty() && fields.is_empty()) {
+                self.phases.push(begins.and("{ ").then(Said::joined(fields, ", ")).and(" }"));
+            }
+            self.phases.extend(self.told.then.take());
+        } else if fields.is_empty() {
+            self.phases.extend(timed);
+        } else {
+            let mark = event.map_or(&self.moving.entity.mark, |event| &event.mark);
+            return source.refuse(mark, BESIDE_TIMES);
+        }
+        Some(())
+    }
+
+    /// The fields that end what goes on when an event and those with it begin.
+    fn ended(&mut self, source: &mut Source, event: &Event) -> Option<Vec<Said>> {
+        let mut fields = Vec::new();
+        for event in self.sequence.with(event) {
+            let ended = self.sequence.ends_what_goes_on(source, event)?;
+            if fields.is_empty() {
+                fields.extend(ended);
+            }
+            self.sequence.waits_for_known_ends(source, event)?;
+            if self.sequence.changes_speed_at(event) {
+                self.told.mps = None;
+            }
+        }
+        Some(fields)
+    }
+
+    /// Begins to follow a trajectory: its phases if it has times, and the words before a phase that waits for its end.
+    fn follow(
+        &mut self,
+        source: &mut Source,
+        act: &Act,
+        way: &Way,
+        begins: &Said,
+        timed: &mut Vec<Said>,
+    ) -> Option<Said> {
+        let (cast, moving) = (self.cast, self.moving);
+        let leg = moving.leg(way)?;
+        let is_beside = (self.told.offset_m - moving.offset_m).abs() > 0.01;
+        source.refuse_if(is_beside, &act.mark, "it is beside its way when its trajectory begins")?;
+        // Without times it goes on with the speed that it has, which is 0 where nothing tells it more.
+        let stands = self.told.mps == Some(0.0) && way.shape.drops_times;
+        let reason = "its times are not read, and it stands: `Polyline` is read with times";
+        source.refuse_if(stands, &act.mark, reason)?;
+        let then = if way.timing.is_some() {
+            let then;
+            (*timed, then) = cast.timed(source, moving, &leg.timed, begins.clone(), way.is_absolute)?;
+            let first_s = leg.timed.first().map_or(0.0, |(_, first_s)| *first_s);
+            let waits = !way.is_absolute && first_s > 0.0 && self.told.mps != Some(0.0);
+            source.refuse_if(waits, &act.mark, TIMES_LATER)?;
+            then
+        } else {
+            arrives(leg.end_m)
+        };
+        cast.told_at_the_end(moving, leg, &mut self.told);
+        Some(then)
+    }
+}
+
 impl<'a> Cast<'a> {
     /// What somebody does, phase by phase.
     pub fn phases(&self, source: &mut Source, moving: &Moving<'a>) -> Option<Vec<Said>> {
         let entity = moving.entity;
-        let mut events: Vec<&Event> = entity.events.iter().filter(|event| !event.acts.is_empty()).collect();
         let is_placed = |act: &Act| matches!(act.kind, ActKind::Ahead(..));
+        let mut events: Vec<&Event> = entity.events.iter().filter(|event| !event.acts.is_empty()).collect();
         events.retain(|event| !(event.when.is_empty() && event.acts.iter().all(is_placed)));
         if events.iter().all(|event| event.time_s().is_some()) {
             events.sort_by(|a, b| a.time_s().unwrap_or(0.0).total_cmp(&b.time_s().unwrap_or(0.0)));
         }
         let sequence = self.in_sequence(source, moving, &events)?;
-        let mut told = Told {
-            mps: Some(moving.mps),
-            offset_m: moving.offset_m,
-            at_m: moving.at_m,
-            lane: moving.placed.lane,
-            lane_m: 0.0,
-            then: None,
-        };
-        told.lane_m = told.lane.map_or(0.0, |lane| self.aside_m(moving, told.at_m, lane));
-        let mut phases = Vec::new();
-        // After what takes a while: what may follow.
-        let mut takes: Option<Takes> = None;
-        if let Some(way) = &entity.way {
-            let leg = moving.leg(way)?;
-            if way.timing.is_some() {
-                let (timed, then) = self.timed(source, moving, &leg.timed, Said::default(), true)?;
-                let waits = leg.timed.first().is_some_and(|(_, first_s)| *first_s > 0.0) && moving.mps > 0.0;
-                source.refuse_if(waits, &entity.mark, TIMES_LATER)?;
-                phases.extend(timed);
-                takes = Some(Takes { then: vec![then], is_cut_short: false });
-            }
-            self.told_at_the_end(moving, leg, &mut told);
-        }
+        let mut script = Script::new(self, moving, sequence);
+        script.on_its_way(source)?;
         let (at_once, later): (Vec<&Event>, Vec<&Event>) =
             events.into_iter().partition(|event| event.when.is_empty());
         let first = at_once.iter().flat_map(|event| &event.acts).filter(|act| !is_placed(act)).collect();
-        let groups = by_moment(first, later);
         // Also one that only placed somebody, which took no time.
         let mut before: Vec<&Event> = entity.events.iter().filter(|event| event.when.is_empty()).collect();
-        for (event, acts) in groups {
-            let reason =
-                "beside the times of a trajectory or of a profile only what waits for their end is read";
+        for (event, acts) in by_moment(first, later) {
             let begins = match event {
                 None => {
-                    source.refuse_if(takes.is_some(), &entity.mark, reason)?;
+                    source.refuse_if(script.takes.is_some(), &entity.mark, BESIDE_TIMES)?;
                     Said::default()
                 }
                 Some(event) => {
-                    let rises = |one: &Condition| matches!(one.edge, Edge::None | Edge::Rising);
-                    let is_first = matches!(event.when.as_slice(), [all] if all.len() == 1 && all.iter().all(rises))
-                        && before.iter().all(|event| event.when.is_empty());
-                    let waiting = Waiting { cast: self, actor: moving, before: before.clone(), is_first };
-                    let begins = waiting.begins(source, &event.when)?;
-                    let is_endless = phases.last().is_some_and(|phase: &Said| phase.holds(CONTINUOUS));
-                    let waits = begins.once.is_some() && !begins.is_after;
-                    let never = "what comes after a speed or a distance that is kept waits for the end of that, which never comes";
-                    source.refuse_if(is_endless && !waits, &event.mark, never)?;
-                    if let Some(Takes { then, is_cut_short }) = takes.take() {
-                        let waits = match is_cut_short {
-                            true => waiting.waits_for_a_way(&event.when),
-                            false => waiting.waits_for_the_end(&event.when),
-                        };
-                        source.refuse_if(!waits && !is_cut_short, &event.mark, reason)?;
-                        if waits {
-                            let then = then.into_iter().filter(|then| !then.0.is_empty());
-                            phases.extend(then.map(|then| then.and("{}")));
-                        }
-                    }
-                    if begins.is_after {
-                        phases.push(Said::text("after 0 s {}"));
-                    }
-                    phases.extend(
-                        begins.first.as_ref().map(|first| Said::text("once ").then(first.clone()).and(" {}")),
-                    );
-                    begins.said()
+                    let begins = script.begins(source, event, &before)?;
+                    before = entity.events.iter().filter(|other| same_moment(other, event)).collect();
+                    begins
                 }
             };
-            if let Some(event) = event {
-                before = entity.events.iter().filter(|other| same_moment(other, event)).collect();
-            }
-            let mut fields = Vec::new();
-            if let Some(event) = event {
-                for event in sequence.with(event) {
-                    let ended = sequence.ends_what_goes_on(source, event)?;
-                    if fields.is_empty() {
-                        fields.extend(ended);
-                    }
-                    sequence.waits_for_known_ends(source, event)?;
-                    if sequence.changes_speed_at(event) {
-                        told.mps = None;
-                    }
-                }
-            }
-            go_together(source, &acts, &told)?;
-            let mut timed = Vec::new();
-            let mut own: Option<Takes> = None;
-            for act in acts {
-                match &act.kind {
-                    ActKind::Keep(kept) if !kept.is_continuous => {
-                        let (_, too_far) = self.too_far(source, moving, &act.mark, kept)?;
-                        let near = Said::text("once ").then(too_far.clone()).and(" <= ").number(KEPT_M, "m");
-                        let near = near.and(" and ").then(too_far).and(" >= ").number(-KEPT_M, "m");
-                        self.fields(source, moving, act, &mut told, &mut fields)?;
-                        told.then = Some(near.and(" { speed: npc.speed }"));
-                    }
-                    ActKind::Follow(way) => {
-                        let leg = moving.leg(way)?;
-                        let reason = "it is beside its way when its trajectory begins";
-                        source.refuse_if(
-                            (told.offset_m - moving.offset_m).abs() > 0.01,
-                            &act.mark,
-                            reason,
-                        )?;
-                        // Without times it goes on with the speed that it has, which is 0 where nothing tells it more.
-                        let stands = told.mps == Some(0.0) && way.shape.drops_times;
-                        let reason = "its times are not read, and it stands: `Polyline` is read with times";
-                        source.refuse_if(stands, &act.mark, reason)?;
-                        let then = if way.timing.is_some() {
-                            let then;
-                            (timed, then) =
-                                self.timed(source, moving, &leg.timed, begins.clone(), way.is_absolute)?;
-                            let first_s = leg.timed.first().map_or(0.0, |(_, first_s)| *first_s);
-                            let waits = !way.is_absolute && first_s > 0.0 && told.mps != Some(0.0);
-                            source.refuse_if(waits, &act.mark, TIMES_LATER)?;
-                            then
-                        } else {
-                            arrives(leg.end_m)
-                        };
-                        Takes::add(&mut own, then, way.timing.is_none());
-                        self.told_at_the_end(moving, leg, &mut told);
-                    }
-                    ActKind::Profile(entries) => {
-                        let reason = "its trajectory has times, which say the speed already";
-                        let has_times = moving.legs.iter().any(|leg| !leg.timed.is_empty());
-                        source.refuse_if(has_times, &act.mark, reason)?;
-                        let begins = begins.clone();
-                        let then;
-                        (timed, then) = pace::profile(source, &act.mark, told.mps, entries, begins)?;
-                        Takes::add(&mut own, then, false);
-                        told.mps = entries.last().map(|entry| entry.mps);
-                    }
-                    _ => self.fields(source, moving, act, &mut told, &mut fields)?,
-                }
-            }
-            takes = own.or(takes);
-            if timed.is_empty() {
-                // A phase that waits for nothing and tells nothing is none.
-                if !(begins.0.is_empty() && fields.is_empty()) {
-                    phases.push(begins.and("{ ").then(Said::joined(fields, ", ")).and(" }"));
-                }
-                phases.extend(told.then.take());
-            } else if fields.is_empty() {
-                phases.extend(timed);
-            } else {
-                let mark = &event.map_or(&entity.mark, |event| &event.mark);
-                return source.refuse(*mark, reason);
-            }
+            script.together(source, event, begins, &acts)?;
         }
-        Some(phases)
+        Some(script.phases)
     }
 
     /// What follows is told where a trajectory ends.

@@ -164,7 +164,7 @@ fn played(
         if moment.step < script.steps.len() {
             offers.push(offered(&table.offers(moment.situation)));
         }
-        script.choose(table, moment)
+        script.choose(moment)
     };
     let log = episode::run_watched(&setup, &mut choose, &mut |world, ads, contacts| {
         recorder.note(world, ads, contacts);

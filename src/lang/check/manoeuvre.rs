@@ -40,15 +40,9 @@ impl Checker {
     /// Notes the names that actions give to what they spawn. Phases, orders and rules may stand before them.
     pub(super) fn declare_bearers(&mut self, items: &[&ast::Item]) {
         let effects = each(items, ItemKind::as_action).flat_map(|(_, action)| &action.effects);
-        let named = effects.filter_map(|effect| match &effect.kind {
-            ast::EffectKind::Spawn { bearers, body, place, fields, .. } => {
-                Some((bearers, (body, place, fields)))
-            }
-            ast::EffectKind::Set { .. } | ast::EffectKind::Order { .. } => None,
-        });
-        for (name, (body, place, fields)) in
-            named.flat_map(|(names, spawn)| names.iter().map(move |name| (name, spawn)))
-        {
+        let spawns = effects.filter_map(ast::Effect::spawn);
+        for (name, spawn) in spawns.flat_map(|spawn| spawn.bearers.iter().map(move |name| (name, spawn))) {
+            let ast::Spawn { body, place, fields, .. } = spawn;
             let is_on_foot = |name: &String| {
                 let own = self.bodies.iter().find(|body| body.name == *name);
                 let like = own.map(|own| own.like).or_else(|| Body::from_name(name));

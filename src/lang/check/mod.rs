@@ -46,6 +46,7 @@ mod scenario_names;
 mod scenario_rules;
 mod scenario_value;
 mod settings;
+mod spawn;
 pub mod state_argument;
 mod style;
 mod trajectory;

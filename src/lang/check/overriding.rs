@@ -208,7 +208,7 @@ fn touched<'a>(items: impl Iterator<Item = &'a Item>) -> BTreeSet<String> {
     effects
         .flat_map(|effect| match &effect.kind {
             EffectKind::Set { state, .. } => vec![state.text.clone()],
-            EffectKind::Spawn { .. } => gaps.clone(),
+            EffectKind::Spawn(_) => gaps.clone(),
             EffectKind::Order { .. } => Vec::new(),
         })
         .collect()

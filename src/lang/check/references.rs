@@ -417,12 +417,8 @@ impl References {
                 let is_axis = |p: &ast::ActionParam| p.mode == ParamMode::Each;
                 let parts = of.params.iter().map(|p| (Some(&p.name), parameter(&p.name), p.span, is_axis(p)));
                 self.declare(item, Symbol::Action, parts.collect());
-                let named = of.effects.iter().flat_map(|effect| match &effect.kind {
-                    ast::EffectKind::Spawn { bearers, .. } => {
-                        bearers.iter().map(|name| (effect, name)).collect()
-                    }
-                    ast::EffectKind::Set { .. } | ast::EffectKind::Order { .. } => Vec::new(),
-                });
+                let spawns = of.effects.iter().filter_map(|effect| Some((effect, effect.spawn()?)));
+                let named = spawns.flat_map(|(effect, of)| of.bearers.iter().map(move |name| (effect, name)));
                 for (effect, name) in named {
                     let declaration = Declaration {
                         span: effect.span,

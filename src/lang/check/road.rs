@@ -10,7 +10,7 @@ use crate::check::names::unknown;
 use crate::check::report::{Report, all_of, field};
 use crate::model::vocabulary::{RoadField, Word};
 use crate::model::{
-    LightProgram, Road, RoadFacts, SIGNAL_PHASE_S, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, Type, code,
+    Road, RoadFacts, SIGNAL_PHASE_S, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, SignalProgram, Type, code,
     stretches,
 };
 use crate::syntax::ast::ItemKind;
@@ -141,7 +141,7 @@ impl Checker {
             }
             None => Some(None),
         };
-        let lights = LightProgram {
+        let signal_program = SignalProgram {
             green_s: light_time(RoadField::Green, LIGHT_S_MIN)?,
             yellow_s: light_time(RoadField::Yellow, LIGHT_S_MIN)?,
             all_red_s: light_time(RoadField::AllRed, 0.0)?,
@@ -159,7 +159,7 @@ impl Checker {
             ego_mps: ego_mps?,
             set_mps,
             signal_phase_s,
-            lights,
+            signal_program,
             trajectories: Vec::new(),
             facts,
         })

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use crate::check::action::possible;
 use crate::check::checker::{Checker, docs};
 use crate::check::expression::{Place, enum_of};
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
+use crate::check::spawn::possible;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::states_read;
 use crate::model::vocabulary::{CHANGE, Known, Site, Then, Verb};

@@ -167,11 +167,13 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
                 names.push(who);
                 fields.extend(of_order);
             }
-            ast::EffectKind::Spawn { body, place, distance, of, apart, cover, fields: of_spawn, .. } => {
-                names.extend(of);
-                exprs.extend(place.trajectory());
-                exprs.extend([body, distance].into_iter().chain(apart.as_deref()).chain(cover.as_deref()));
-                fields.extend(of_spawn);
+            ast::EffectKind::Spawn(spawn) => {
+                names.extend(&spawn.of);
+                exprs.extend(spawn.place.trajectory());
+                exprs.extend(
+                    [&spawn.body, &spawn.distance].into_iter().chain(&spawn.apart).chain(&spawn.cover),
+                );
+                fields.extend(&spawn.fields);
             }
         }
     }

@@ -41,18 +41,12 @@ impl Told {
         Told(bits)
     }
 
-    /// These figures, and which of the words, in this order.
-    fn all(figures: impl Iterator<Item = CommandField>, words: [bool; 7]) -> Told {
-        const WORDS: [CommandField; 7] = [
-            CommandField::Lane,
-            CommandField::Ignores,
-            CommandField::Siren,
-            CommandField::Turn,
-            CommandField::Continuous,
-            CommandField::To,
-            CommandField::Lights,
-        ];
-        let words = WORDS.into_iter().zip(words).filter(|(_, says)| *says).map(|(field, _)| field);
+    /// These figures, and those of the words that are said.
+    fn all(
+        figures: impl Iterator<Item = CommandField>,
+        words: impl IntoIterator<Item = (CommandField, bool)>,
+    ) -> Told {
+        let words = words.into_iter().filter(|(_, is_said)| *is_said).map(|(field, _)| field);
         figures.chain(words).fold(Told::NOTHING, |told, field| told.and(Told::of(&[field])))
     }
 
@@ -409,13 +403,13 @@ impl CommandDef {
     pub fn told(&self) -> Told {
         let CommandDef { lane, ignores, siren, turn, continuous, to, lights, .. } = self;
         let words = [
-            lane.is_some(),
-            ignores.is_some(),
-            siren.is_some(),
-            turn.is_some(),
-            continuous.is_some(),
-            to.is_some(),
-            lights.is_some(),
+            (CommandField::Lane, lane.is_some()),
+            (CommandField::Ignores, ignores.is_some()),
+            (CommandField::Siren, siren.is_some()),
+            (CommandField::Turn, turn.is_some()),
+            (CommandField::Continuous, continuous.is_some()),
+            (CommandField::To, to.is_some()),
+            (CommandField::Lights, lights.is_some()),
         ];
         Told::all(self.figures().map(|figure| figure.field), words)
     }
@@ -518,13 +512,13 @@ impl Command {
     fn told(&self) -> Told {
         let Command { lane, ignores, siren, turn, is_continuous, to, lights, .. } = *self;
         let words = [
-            lane.is_some(),
-            ignores.is_some(),
-            siren.is_some(),
-            turn.is_some(),
-            is_continuous,
-            to.is_some(),
-            lights.is_some(),
+            (CommandField::Lane, lane.is_some()),
+            (CommandField::Ignores, ignores.is_some()),
+            (CommandField::Siren, siren.is_some()),
+            (CommandField::Turn, turn.is_some()),
+            (CommandField::Continuous, is_continuous),
+            (CommandField::To, to.is_some()),
+            (CommandField::Lights, lights.is_some()),
         ];
         let mut command = *self;
         let says = |figure: &Figure| (figure.value)(&mut command).is_some();

@@ -54,9 +54,9 @@ pub use scenario::{
 pub use sliding::Sliding;
 pub use space::{
     ACTION_ODDS_MAX, ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef,
-    GroupDef, InRow, Initial, LightDef, LightProgram, ManoeuvreCall, ManoeuvreDef, OrderDef, Parameter,
-    PhaseDef, RequirementDef, RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space,
-    SpawnDef, StateDef, StateMeaning, VerdictDef, WordExpr, reached, told,
+    GroupDef, InRow, Initial, LightDef, ManoeuvreCall, ManoeuvreDef, OrderDef, Parameter, PhaseDef,
+    RequirementDef, RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, SignalProgram,
+    Space, SpawnDef, StateDef, StateMeaning, VerdictDef, WordExpr, reached, told,
 };
 pub use trajectory::{BesideRoute, Laid, Trajectory, TrajectoryDef, WayPoint, through};
 pub(crate) use value::STATE_MAX;

@@ -231,12 +231,7 @@ impl ActionDef {
 
     /// The manoeuvres that it gives to road users, in the order of its effects.
     pub fn manoeuvres(&self) -> impl Iterator<Item = usize> {
-        let calls = self.effects.iter().filter_map(|effect| match effect {
-            EffectDef::Set(_) | EffectDef::Light(_) => None,
-            EffectDef::Spawn(spawn) => spawn.manoeuvre.as_ref(),
-            EffectDef::Order(order) => order.manoeuvre.as_ref(),
-        });
-        calls.map(|call| call.manoeuvre)
+        self.effects.iter().filter_map(EffectDef::manoeuvre).map(|call| call.manoeuvre)
     }
 
     /// What it orders named road users to do.
@@ -248,7 +243,7 @@ impl ActionDef {
     }
 
     /// What it tells the ego vehicle's next traffic light.
-    pub(crate) fn lights(&self) -> impl Iterator<Item = &LightDef> {
+    pub(crate) fn light_orders(&self) -> impl Iterator<Item = &LightDef> {
         self.effects.iter().filter_map(|effect| match effect {
             EffectDef::Light(light) => Some(&**light),
             EffectDef::Set(_) | EffectDef::Spawn(_) | EffectDef::Order(_) => None,
@@ -303,6 +298,17 @@ pub enum EffectDef {
     Spawn(Box<SpawnDef>),
     Order(Box<OrderDef>),
     Light(Box<LightDef>),
+}
+
+impl EffectDef {
+    /// The manoeuvre that a road user is given.
+    pub fn manoeuvre(&self) -> Option<&ManoeuvreCall> {
+        match self {
+            EffectDef::Set(_) | EffectDef::Light(_) => None,
+            EffectDef::Spawn(spawn) => spawn.manoeuvre.as_ref(),
+            EffectDef::Order(order) => order.manoeuvre.as_ref(),
+        }
+    }
 }
 
 /// How a state changes: all its cells, or only the cell of a key.
@@ -631,7 +637,7 @@ pub struct Road {
     pub set_mps: Option<f64>,
     /// When in the signals' cycle an episode begins, s; `None`: by chance.
     pub signal_phase_s: Option<f64>,
-    pub lights: LightProgram,
+    pub signal_program: SignalProgram,
     /// Where each trajectory of the space lies; `None` for one on another map.
     pub trajectories: Vec<Option<Laid>>,
     pub facts: RoadFacts,
@@ -639,7 +645,7 @@ pub struct Road {
 
 /// How long the lights of a road show what, s; `None`: as the engine's.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct LightProgram {
+pub struct SignalProgram {
     pub green_s: Option<f64>,
     pub yellow_s: Option<f64>,
     pub all_red_s: Option<f64>,

@@ -89,7 +89,7 @@ fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
             (figure.field.name(), "an order", figure.unit, figure.expr, bounds)
         })
     });
-    let of_lights = space.actions[action].lights();
+    let of_lights = space.actions[action].light_orders();
     let of_lights =
         of_lights.filter_map(|light| Some(("at", "an order", "m", light.at.as_ref()?, LIGHT_AT_M)));
     of_spawns.chain(of_orders).chain(of_lights).filter_map(move |(what, whose, unit, expr, range)| {

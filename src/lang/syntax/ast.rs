@@ -341,24 +341,44 @@ pub struct Effect {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum EffectKind {
     /// `set sky = None`, `set sky[what] = how`.
-    Set { state: Name, key: Option<Expr>, value: Expr },
-    /// `spawn vehicle ahead distance { speed: speed }`.
-    /// With a `cover`: `spawn Pedestrian ahead distance from behind SUV { … }`.
-    /// With a name for its bearer: `spawn BoxTruck as truck ahead distance { … }`; with several for a row:
-    /// `spawn BoxTruck as [last, first] ahead distance apart 15 m { … }`.
-    Spawn {
-        body: Expr,
-        bearers: Vec<Name>,
-        place: Place,
-        distance: Expr,
-        /// Whose distance it is; that to the ego vehicle without it.
-        of: Option<Name>,
-        apart: Option<Box<Expr>>,
-        cover: Option<Box<Expr>>,
+    Set {
+        state: Name,
+        key: Option<Expr>,
+        value: Expr,
+    },
+    Spawn(Box<Spawn>),
+    /// `order truck { speed: 0 m/s }`.
+    Order {
+        who: Name,
         fields: Vec<Field>,
     },
-    /// `order truck { speed: 0 m/s }`.
-    Order { who: Name, fields: Vec<Field> },
+}
+
+/// `spawn vehicle ahead distance { speed: speed }`.
+/// With a `cover`: `spawn Pedestrian ahead distance from behind SUV { … }`.
+/// With a name for its bearer: `spawn BoxTruck as truck ahead distance { … }`; with several for a row:
+/// `spawn BoxTruck as [last, first] ahead distance apart 15 m { … }`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Spawn {
+    pub body: Expr,
+    pub bearers: Vec<Name>,
+    pub place: Place,
+    pub distance: Expr,
+    /// Whose distance it is; that to the ego vehicle without it.
+    pub of: Option<Name>,
+    pub apart: Option<Expr>,
+    pub cover: Option<Expr>,
+    pub fields: Vec<Field>,
+}
+
+impl Effect {
+    /// What the effect makes appear, if anything.
+    pub fn spawn(&self) -> Option<&Spawn> {
+        match &self.kind {
+            EffectKind::Spawn(spawn) => Some(spawn),
+            EffectKind::Set { .. } | EffectKind::Order { .. } => None,
+        }
+    }
 }
 
 /// From where the distance of a spawn counts.

@@ -11,7 +11,7 @@ use crate::syntax::ast::{
     Action, ActionParam, Also, Block, Case, Clause, ClauseKind, Effect, EffectKind, Enum, Expect, Expr,
     Field, FileId, Fn, FnParam, Group, Initial, InitialKey, ItemKind, Let, Manoeuvre, Move, Name, Number,
     Odds, ParamMode, Phase, Place, Policy, PolicyLine, Require, Rule as NamedRule, RuleBody, Scenario, Span,
-    State, Step, Text, Type, TypeKind, Use, Verdict,
+    Spawn, State, Step, Text, Type, TypeKind, Use, Verdict,
 };
 use crate::syntax::grammar::{Rule, is_plain_terminal};
 use crate::syntax::{Diagnostic, code};
@@ -340,16 +340,15 @@ impl Builder {
             };
             let distance = self.expression(parts.next())?;
             let of = parts.take(Rule::of_whom).map(|of| self.name(Parts::of(of).next()));
-            let apart = parts.take(Rule::apart).map(|apart| self.only_expression(apart).map(Box::new));
-            let apart = apart.transpose()?;
+            let apart = parts.take(Rule::apart).map(|apart| self.only_expression(apart)).transpose()?;
             let cover = parts.take(Rule::cover).map(|cover| {
                 let mut parts = Parts::of(cover);
                 parts.take(Rule::kw_behind);
-                self.expression(parts.next()).map(Box::new)
+                self.expression(parts.next())
             });
             let cover = cover.transpose()?;
             let fields = self.fields(parts.next())?;
-            EffectKind::Spawn { body, bearers, place, distance, of, apart, cover, fields }
+            EffectKind::Spawn(Box::new(Spawn { body, bearers, place, distance, of, apart, cover, fields }))
         };
         Ok(Effect { kind, span })
     }

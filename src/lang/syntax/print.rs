@@ -8,7 +8,7 @@
 use crate::syntax::ast::{
     Action, ActionParam, Case, ClauseKind, Doc, Effect, EffectKind, Expect, Expr, ExprKind, Field, File,
     FnParam, Initial, InitialKey, Item, ItemKind, Move, Name, ParamMode, Phase, Place, Policy, PolicyLine,
-    Require, Rule, RuleBody, Scenario, Span, Step, Type, TypeKind,
+    Require, Rule, RuleBody, Scenario, Span, Spawn, Step, Type, TypeKind,
 };
 use crate::syntax::layout::{INDENT, Layout, WIDTH};
 use crate::syntax::print_expression::{
@@ -674,7 +674,8 @@ fn effect(effect: &Effect) -> Layout {
         EffectKind::Order { who, fields: entries } => {
             Layout::row([Layout::text(format!("order {} ", who.text)), fields(entries)])
         }
-        EffectKind::Spawn { body, bearers, place, distance, of, apart, cover, fields: entries } => {
+        EffectKind::Spawn(spawn) => {
+            let Spawn { body, bearers, place, distance, of, apart, cover, fields: entries } = &**spawn;
             let mut parts = vec![Layout::text("spawn "), expression(body)];
             let names: Vec<&str> = bearers.iter().map(|name| name.text.as_str()).collect();
             match names[..] {

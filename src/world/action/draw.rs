@@ -157,14 +157,10 @@ impl<'a> Judge<'a> {
     fn judge(&self, values: &[Value], refusals_max: usize) -> Result<Draw, Vec<Refusal>> {
         let before = self.situation.memory;
         let after = self.after(values);
-        let mut effects = self.effects(values, &after);
+        let (mut effects, written) = self.effects(values, &after);
         let mut refusals = Vec::new();
         let mut spawns = Vec::new();
-        let mut spawn_defs = self.happening(values, &after).filter_map(|effect| match effect {
-            EffectDef::Spawn(spawn) => Some(spawn),
-            EffectDef::Set(_) | EffectDef::Order(_) | EffectDef::Light(_) => None,
-        });
-        for (nth, effect) in effects.iter().enumerate() {
+        for (nth, (effect, written)) in effects.iter().zip(&written).enumerate() {
             if refusals.len() >= refusals_max {
                 return Err(refusals);
             }
@@ -187,7 +183,7 @@ impl<'a> Judge<'a> {
                     continue;
                 }
             };
-            let is_beside = spawn_defs.next().is_some_and(|spawn| spawn.of.is_some());
+            let is_beside = matches!(written, EffectDef::Spawn(spawn) if spawn.of.is_some());
             let least_m = match request.lane {
                 LaneChoice::Current => spawn_distance_m(request.verb).start().max(0.0),
                 LaneChoice::Left | LaneChoice::Right => *spawn_distance_m(request.verb).start(),
@@ -206,7 +202,6 @@ impl<'a> Judge<'a> {
                 Err(reason) => refusals.push(refuse(None, format!("cannot spawn: {reason}"))),
             }
         }
-        drop(spawn_defs);
         let world = WorldFacts { spawns, ..self.world() };
         let candidate = Candidate { values, before, after: &after, world: Some(&world) };
         let breaches = self.row.breaches(candidate).take(refusals_max.saturating_sub(refusals.len()));
@@ -217,6 +212,7 @@ impl<'a> Judge<'a> {
         if !refusals.is_empty() {
             return Err(refusals);
         }
+        let courses = self.courses(values, &after, &written);
         // What every step changes comes without a question: it is no action, and not the world's to refuse.
         for effect in Effect::of_change(self.row.space, before, &after) {
             if !effects.contains(&effect) {
@@ -224,7 +220,6 @@ impl<'a> Judge<'a> {
             }
         }
         let lane_changes = self.lane_changes(values);
-        let courses = self.courses(values, &after, &effects);
         let values = self.action.drawn_of(values);
         Ok(Draw { row: self.row.row.index, values, effects, memory_after: after, lane_changes, courses })
     }
@@ -238,15 +233,8 @@ impl<'a> Judge<'a> {
         })
     }
 
-    /// The manoeuvres of its spawns and orders, which stand among the effects in the order of their declaration.
-    fn courses(&self, values: &[Value], after: &Memory, effects: &[Effect]) -> Vec<(usize, Arc<Course>)> {
-        let of_road_users = |effect: &Effect| matches!(effect, Effect::Spawn(_) | Effect::Order(_));
-        let places = effects.iter().enumerate().filter(|(_, effect)| of_road_users(effect)).map(|(at, _)| at);
-        let calls = self.happening(values, after).filter_map(|effect| match effect {
-            EffectDef::Set(_) | EffectDef::Light(_) => None,
-            EffectDef::Spawn(spawn) => Some(spawn.manoeuvre.as_ref()),
-            EffectDef::Order(order) => Some(order.manoeuvre.as_ref()),
-        });
+    /// The manoeuvres of its spawns and orders, each with the place of its effect among `written`.
+    fn courses(&self, values: &[Value], after: &Memory, written: &[&EffectDef]) -> Vec<(usize, Arc<Course>)> {
         let space = self.row.space;
         let course = |call: &ManoeuvreCall| {
             let facts = self.facts(values, after);
@@ -261,7 +249,8 @@ impl<'a> Judge<'a> {
             let parts: Arc<[Part]> = all.into_iter().map(part).collect();
             Arc::new(Course::new(parts, 0, later))
         };
-        places.zip(calls).filter_map(|(at, call)| Some((at, course(call?)))).collect()
+        let calls = written.iter().enumerate().filter_map(|(at, effect)| Some((at, effect.manoeuvre()?)));
+        calls.map(|(at, call)| (at, course(call))).collect()
     }
 
     /// What is asked after the draw, with these values.
@@ -279,46 +268,44 @@ impl<'a> Judge<'a> {
         Facts { road: self.row.road, ..Facts::new(values, memory) }
     }
 
-    /// The effects of the action, without those about whom a row has fewer.
-    fn happening<'f>(
-        &'f self,
-        values: &'f [Value],
-        after: &'f Memory,
-    ) -> impl Iterator<Item = &'f EffectDef> {
-        let appears = |spawn: &SpawnDef| spawn.appears(&self.row.space.functions, &self.facts(values, after));
+    /// The changes of the world, and beside each the effect that asks for it. They carry the values of the memory after the
+    /// action, so that world and memory agree.
+    fn effects<'f>(&'f self, locals: &[Value], after: &Memory) -> (Vec<Effect>, Vec<&'f EffectDef>) {
+        let facts = self.facts(locals, after);
+        let functions = &self.row.space.functions;
+        // Nothing is asked of those by whom a row has fewer.
+        let appears = |spawn: &SpawnDef| spawn.appears(functions, &facts);
         let missing = self.action.spawns().filter(|spawn| !appears(spawn)).filter_map(|spawn| spawn.bearer);
         let missing: Vec<usize> = missing.collect();
-        self.action.effects.iter().filter(move |effect| match effect {
+        let happens = |effect: &&EffectDef| match effect {
             EffectDef::Spawn(spawn) => appears(spawn),
-            EffectDef::Order(order) => !missing.contains(&order.who.bearer(values)),
+            EffectDef::Order(order) => !missing.contains(&order.who.bearer(locals)),
             EffectDef::Set(_) | EffectDef::Light(_) => true,
-        })
-    }
-
-    /// The changes of the world. They carry the values of the memory after the action, so that world and
-    /// memory agree.
-    fn effects(&self, locals: &[Value], after: &Memory) -> Vec<Effect> {
-        let mut effects = Vec::new();
-        for effect in self.happening(locals, after) {
+        };
+        let (mut effects, mut written) = (Vec::new(), Vec::new());
+        for effect in self.action.effects.iter().filter(happens) {
+            let mut add = |change: Effect| {
+                effects.push(change);
+                written.push(effect);
+            };
             match effect {
                 EffectDef::Set(set) => {
                     let state = &self.row.space.states[set.state];
-                    let key = set.key.as_ref().map(|key| {
-                        evaluate(key, &self.row.space.functions, &self.facts(locals, after)).variant()
-                    });
+                    let key = set.key.as_ref().map(|key| evaluate(key, functions, &facts).variant());
                     let touched = key.map_or(0..state.cells, |key| key..key + 1);
-                    for effect in touched.filter_map(|cell| Effect::of_cell(state, cell, after)) {
-                        if !effects.contains(&effect) {
-                            effects.push(effect);
+                    for change in touched.filter_map(|cell| Effect::of_cell(state, cell, after)) {
+                        if !effects.contains(&change) {
+                            effects.push(change);
+                            written.push(effect);
                         }
                     }
                 }
-                EffectDef::Spawn(spawn) => effects.push(Effect::Spawn(self.request(spawn, locals, after))),
-                EffectDef::Order(order) => effects.push(Effect::Order(self.order(order, locals, after))),
-                EffectDef::Light(light) => effects.push(Effect::Light(self.light(light, locals, after))),
+                EffectDef::Spawn(spawn) => add(Effect::Spawn(self.request(spawn, locals, after))),
+                EffectDef::Order(order) => add(Effect::Order(self.order(order, locals, after))),
+                EffectDef::Light(light) => add(Effect::Light(self.light(light, locals, after))),
             }
         }
-        effects
+        (effects, written)
     }
 
     /// The distance from the ego vehicle of a place that is asked for beside another road user, m: NaN while that one is not
@@ -380,6 +367,9 @@ impl<'a> Judge<'a> {
         let is_beside_route = |index: usize| self.row.space.trajectories[index].is_beside_route();
         let begins = trajectory.filter(|index| is_beside_route(*index));
         let begins = begins.map(|_| self.begins(spawn, asked_m, locals));
+        let figure = |expr: &Option<Expr>, bounds| {
+            expr.as_ref().map(|expr| rounded_into(evaluate(expr, functions, &facts).number(), bounds))
+        };
         SpawnRequest {
             body: body.like,
             own: own(body),
@@ -396,23 +386,11 @@ impl<'a> Judge<'a> {
                 Some(of) => self.beside_m(of, spawn, asked_m, shape.length_m, verb, locals),
             },
             cover: cover.map(|cover| cover.like),
-            offset_m: spawn
-                .offset
-                .as_ref()
-                .map_or(0.0, |offset| rounded_into(evaluate(offset, functions, &facts).number(), OFFSET_M)),
+            offset_m: figure(&spawn.offset, OFFSET_M).unwrap_or(0.0),
             ignores: IgnoredRules::of(spawn.ignores.iter().map(|manner| manner.word(functions, &facts))),
-            meet: spawn
-                .meet
-                .as_ref()
-                .map(|meet| rounded_into(evaluate(meet, functions, &facts).number(), MEET)),
-            early_s: spawn
-                .early
-                .as_ref()
-                .map(|early| rounded_into(evaluate(early, functions, &facts).number(), EARLY_S)),
-            waits_s: spawn
-                .waits
-                .as_ref()
-                .map(|waits| rounded_into(evaluate(waits, functions, &facts).number(), WAITS_S)),
+            meet: figure(&spawn.meet, MEET),
+            early_s: figure(&spawn.early, EARLY_S),
+            waits_s: figure(&spawn.waits, WAITS_S),
             siren: spawn.siren.as_ref().is_some_and(|siren| evaluate(siren, functions, &facts).truth()),
             turn: spawn.turn.as_ref().map(|turn| turn.word(functions, &facts)),
             lights: spawn.lights.as_ref().map_or(ShownLights::Off, |lights| lights.word(functions, &facts)),

@@ -73,7 +73,8 @@ impl Ambient {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        trace.words([u64::from(self.wanted), self.attempts, u64::from(self.next_id)]);
+        let Ambient { wanted, attempts, next_id } = *self;
+        trace.words([u64::from(wanted), attempts, u64::from(next_id)]);
     }
 }
 

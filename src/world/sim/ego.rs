@@ -211,19 +211,22 @@ impl Ego {
 
     /// Every bit that later ticks depend on.
     pub fn trace(&self, trace: &mut Trace) {
-        let motion = &self.motion;
+        // Outline and frame follow from the pose.
+        let Ego { motion, throttle_pct, brake_pct, outline: _, frame: _ } = self;
+        let EgoMotion { rear_axle, speed_mps, acceleration_mps2, yaw_rate_radps, steer_rad, touched } =
+            motion;
         trace.numbers([
-            motion.rear_axle.position.x,
-            motion.rear_axle.position.y,
-            motion.rear_axle.heading_rad,
-            motion.speed_mps,
-            motion.acceleration_mps2,
-            motion.yaw_rate_radps,
-            motion.steer_rad,
-            self.throttle_pct,
-            self.brake_pct,
+            rear_axle.position.x,
+            rear_axle.position.y,
+            rear_axle.heading_rad,
+            *speed_mps,
+            *acceleration_mps2,
+            *yaw_rate_radps,
+            *steer_rad,
+            *throttle_pct,
+            *brake_pct,
         ]);
-        trace.word(u64::from(motion.touched));
+        trace.flags([*touched]);
     }
 }
 

@@ -126,9 +126,11 @@ impl Environment {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        trace.word(self.time as u64);
-        trace.words(self.sky.map(|level| level as u64));
-        trace.number(self.water_mm);
+        // The grip follows from the water.
+        let Environment { time, sky, water_mm, grip: _ } = *self;
+        trace.word(time as u64);
+        trace.words(sky.map(|level| level as u64));
+        trace.number(water_mm);
     }
 }
 

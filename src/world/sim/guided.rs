@@ -277,14 +277,25 @@ impl Guided {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        let Guided { station_m, left_m, speed_mps, wants_mps, rate_mps2, .. } = *self;
-        trace.numbers([station_m, left_m, speed_mps, wants_mps, rate_mps2]);
-        if let Some(Shift { from_m, to_m, takes_s, since_s }) = self.shift {
-            trace.word(1);
+        let Guided {
+            station_m,
+            left_m,
+            speed_mps,
+            wants_mps,
+            rate_mps2,
+            shift,
+            meeting,
+            // No tick changes these.
+            way: _,
+            to_middle_m: _,
+        } = self;
+        trace.numbers([*station_m, *left_m, *speed_mps, *wants_mps, *rate_mps2]);
+        trace.flags([shift.is_some(), meeting.is_some()]);
+        if let Some(Shift { from_m, to_m, takes_s, since_s }) = *shift {
             trace.numbers([from_m, to_m, takes_s, since_s]);
         }
-        if let Some(Meeting { ego_m, early_s, reach_m, mps, steady_m, stage }) = self.meeting {
-            trace.words([2, stage as u64]);
+        if let Some(Meeting { ego_m, early_s, reach_m, mps, steady_m, stage }) = *meeting {
+            trace.word(stage as u64);
             trace.numbers([ego_m, early_s, reach_m, mps.unwrap_or(f64::INFINITY), steady_m]);
         }
     }

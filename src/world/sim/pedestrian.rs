@@ -268,26 +268,35 @@ impl Walker {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        trace.numbers([
-            self.from.position.x,
-            self.from.position.y,
-            self.from.heading_rad,
-            self.way_m,
-            self.end_m,
-            self.speed_mps,
-            self.walked_m,
-            self.aside_m,
-            self.pace_mps,
-            self.wants_aside_m,
-        ]);
-        trace.words([self.startle_ticks, self.stuck_ticks, u32::from(self.returns)].map(u64::from));
-        trace.words([self.begins_tick, self.begins_tick_max, self.manner as u64]);
-        // Nothing is fed for who was told nothing and waits for no meeting, as before there were any.
-        if self.is_told {
-            trace.word(1);
-        }
-        if let Some(Meeting { station_m, way_m, comes_from_left }) = self.meeting {
-            trace.numbers([station_m, way_m, f64::from(u8::from(comes_from_left))]);
+        let Walker {
+            meeting,
+            from,
+            way_m,
+            end_m,
+            speed_mps,
+            manner,
+            startle_ticks,
+            walked_m,
+            aside_m,
+            returns,
+            is_told,
+            looks_now,
+            pace_mps,
+            wants_aside_m,
+            begins_tick,
+            begins_tick_max,
+            stuck_ticks,
+            // It follows from where it began.
+            along: _,
+        } = self;
+        trace.flags([*returns, *is_told, *looks_now, meeting.is_some()]);
+        trace.numbers([from.position.x, from.position.y, from.heading_rad]);
+        trace.numbers([*way_m, *end_m, *speed_mps, *walked_m, *aside_m, *pace_mps, *wants_aside_m]);
+        trace.words([*startle_ticks, *stuck_ticks].map(u64::from));
+        trace.words([*begins_tick, *begins_tick_max, *manner as u64]);
+        if let Some(Meeting { station_m, way_m, comes_from_left }) = *meeting {
+            trace.numbers([station_m, way_m]);
+            trace.flags([comes_from_left]);
         }
     }
 

@@ -290,11 +290,18 @@ impl Rights {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        PassedLight::trace(self.passed.as_ref(), trace);
-        trace.word(self.shares.map_or(2, u64::from));
-        trace.word(self.wreck.map_or(u64::MAX, |priority| priority as u64));
-        trace.word(u64::from(self.is_foreseen));
-        if let Some(Meeting { place, priority, tick }) = self.meeting {
+        // What was found on the road follows from where somebody stands.
+        let Rights { passed, shares, meeting, wreck, is_foreseen, on_road: _ } = self;
+        PassedLight::trace(passed.as_ref(), trace);
+        trace.flags([
+            shares.is_some(),
+            *shares == Some(true),
+            meeting.is_some(),
+            wreck.is_some(),
+            *is_foreseen,
+        ]);
+        trace.words(wreck.map(|priority| priority as u64));
+        if let Some(Meeting { place, priority, tick }) = *meeting {
             let (ego, other) = match place {
                 Place::Area(ego, other) => (ego.0 as u64, other.0 as u64),
                 Place::Lane => (u64::MAX, u64::MAX),

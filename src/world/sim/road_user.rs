@@ -313,33 +313,33 @@ impl Running {
     }
 
     fn trace(&self, trace: &mut Trace) {
-        trace.words([self.phase as u64, self.since]);
-        // Nothing is fed for the manoeuvre that was given, as before there were others.
-        trace.words((self.course.part > 0).then_some(self.course.part as u64));
-        match self.stage {
+        let Running { course, phase, stage, since, tracked } = self;
+        trace.words([course.part as u64, *phase as u64, *since]);
+        trace.words(course.arguments());
+        match *stage {
             Stage::Waiting(held) => trace.words([0, held.map_or(0, |tick| tick + 1)]),
             Stage::Holding(until) => trace.words([1, until]),
-            Stage::Over => trace.word(3),
             Stage::UnderWay(command) => {
-                trace.words([2, command.speed_mps.map_or(u64::MAX, f64::to_bits)]);
-                if command.goes_aside() {
-                    trace.word(1);
-                }
-                if command.turn.is_some() {
-                    trace.word(2);
-                }
-                if command.pursues() {
-                    trace.word(3);
-                }
+                trace.word(2);
+                trace_command(&command, trace);
             }
+            Stage::Over => trace.word(3),
         }
-        trace.words(self.course.arguments());
-        if let Some(Tracked { course, phase, first }) = &self.tracked {
+        trace.flags([tracked.is_some()]);
+        if let Some(Tracked { course, phase, first }) = tracked {
             trace.words([course.part as u64, *phase as u64]);
             trace.words(course.arguments());
-            trace.words(first.rate_mps2.map(f64::to_bits));
+            trace_command(first, trace);
         }
     }
+}
+
+/// What was told, as far as it is still asked: the rest was done as it was told.
+fn trace_command(command: &Command, trace: &mut Trace) {
+    let Command { speed_mps, rate_mps2, turn, .. } = command;
+    let has = [speed_mps.is_some(), rate_mps2.is_some(), turn.is_some()];
+    trace.flags([has[0], has[1], has[2], command.goes_aside(), command.pursues()]);
+    trace.numbers(speed_mps.iter().chain(rate_mps2).copied());
 }
 
 #[derive(Debug, Clone)]
@@ -477,15 +477,37 @@ impl RoadUser {
 
     /// Every bit that later ticks depend on.
     pub fn trace(&self, trace: &mut Trace) {
-        let Obstacle { id, body, colour, verb, outline, velocity_mps, spawned_tick, lights, .. } =
-            &self.obstacle;
-        // Nothing is fed for the usual case, as before there were any.
-        trace.words((*lights != ShownLights::Off).then_some(*lights as u64));
-        trace.words([u64::from(*id), *spawned_tick, *body as u64, *colour as u64, *verb as u64]);
+        let RoadUser { obstacle, mover } = self;
+        let Obstacle {
+            id,
+            body,
+            colour,
+            verb,
+            outline,
+            velocity_mps,
+            spawned_tick,
+            lights,
+            // These follow from the body, the outline, the way and the ego vehicle, now and in the ticks before.
+            forward: _,
+            height_m: _,
+            lane_heading_rad: _,
+            acceleration_mps2: _,
+            elevation_m: _,
+            is_apart: _,
+            distance_m: _,
+        } = obstacle;
+        trace.words([
+            u64::from(*id),
+            *spawned_tick,
+            *body as u64,
+            *colour as u64,
+            *verb as u64,
+            *lights as u64,
+        ]);
         let pose = &outline.pose;
         trace.numbers([pose.position.x, pose.position.y, pose.heading_rad]);
         trace.numbers([velocity_mps.x, velocity_mps.y]);
-        self.mover.trace(trace);
+        mover.trace(trace);
     }
 }
 
@@ -614,17 +636,30 @@ impl Mover {
     }
 
     fn trace(&self, trace: &mut Trace) {
-        trace
-            .words([u32::from(self.touched), self.crashed_with.unwrap_or(0), self.rest_ticks].map(u64::from));
-        trace.number(self.visible_fraction);
-        // Nothing is fed for what has no name, as before there were names. Names and manoeuvres are numbered as the space declares
-        // them, so their numbers are left out: what is declared beside them changes no episode.
-        trace.words(self.bearer.map(|_| 1));
-        if let Some(running) = &self.course {
+        let Mover {
+            motion,
+            touched,
+            crashed_with,
+            rest_ticks,
+            visible_fraction,
+            rights,
+            bearer,
+            course,
+            // No tick changes it.
+            size: _,
+            // No tick reads it.
+            phases: _,
+        } = self;
+        // Which name and which manoeuvre is left out: they are numbered as the space declares them, and what is declared beside
+        // them changes no episode.
+        trace.flags([*touched, crashed_with.is_some(), bearer.is_some(), course.is_some()]);
+        trace.words(crashed_with.iter().chain([rest_ticks]).copied().map(u64::from));
+        trace.number(*visible_fraction);
+        if let Some(running) = course {
             running.trace(trace);
         }
-        self.rights.trace(trace);
-        match &self.motion {
+        rights.trace(trace);
+        match motion {
             Motion::Drive(driver) => driver.trace(trace),
             Motion::Walk(walker) => walker.trace(trace),
             Motion::Stroll(stroller) => stroller.trace(trace),

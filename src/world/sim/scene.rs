@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use avastra_base::geometry::{Path, Vec2};
-use avastra_lang::model::{CROSSWALK_GAP_M_MAX, Laid, LightProgram, Road};
+use avastra_lang::model::{CROSSWALK_GAP_M_MAX, Laid, Road, SignalProgram};
 use avastra_road::{FootWay, LaneIndex, Neighbour, RoadMap, Route};
 
 use super::junction::ConflictAreas;
@@ -76,7 +76,7 @@ pub struct Scene {
     pub is_motorway: bool,
     /// How far vehicles are sensed, m.
     pub range_m: f64,
-    pub(super) lights: LightProgram,
+    pub(super) signal_program: SignalProgram,
     /// Where the space's trajectories lie; `None` for those on other maps.
     pub(super) trajectories: Vec<Option<Laid>>,
     pub(super) areas: ConflictAreas,
@@ -102,10 +102,10 @@ impl Scene {
     /// The scene of a road of a space.
     pub fn of(road: &Road) -> Scene {
         let trajectories = road.trajectories.clone();
-        let lights = road.lights;
+        let signal_program = road.signal_program;
         Scene {
             set_mps: road.set_mps,
-            lights,
+            signal_program,
             trajectories,
             ..Scene::new(road.map.clone(), road.route.clone())
         }
@@ -153,7 +153,7 @@ impl Scene {
             range_m: if is_motorway { MOTORWAY_RANGE_M } else { RANGE_M },
             map,
             route,
-            lights: LightProgram::default(),
+            signal_program: SignalProgram::default(),
             trajectories: Vec::new(),
             set_mps: None,
         }

@@ -6,7 +6,7 @@
 //! 5 s. A road may say other times. Counted in ticks, so that the colour of any moment is exact. No vehicle
 //! detection, no pedestrian lights.
 
-use avastra_lang::model::LightProgram;
+use avastra_lang::model::SignalProgram;
 use avastra_lang::model::vocabulary::LightColour;
 use avastra_road::RoadMap;
 
@@ -32,11 +32,11 @@ struct Program {
 }
 
 impl Program {
-    fn of(lights: LightProgram) -> Program {
+    fn of(written: SignalProgram) -> Program {
         Program {
-            green: lights.green_s.map(ticks),
-            yellow: ticks(lights.yellow_s.unwrap_or(YELLOW_S)),
-            all_red: ticks(lights.all_red_s.unwrap_or(ALL_RED_S)),
+            green: written.green_s.map(ticks),
+            yellow: ticks(written.yellow_s.unwrap_or(YELLOW_S)),
+            all_red: ticks(written.all_red_s.unwrap_or(ALL_RED_S)),
         }
     }
 
@@ -70,9 +70,9 @@ struct Cycle {
 
 impl SignalClock {
     /// A clock that is `phase_s` into the cycle; a phase that is negative or not finite counts as 0.
-    pub fn new(phase_s: f64, lights: LightProgram) -> SignalClock {
+    pub fn new(phase_s: f64, program: SignalProgram) -> SignalClock {
         let offset_ticks = (phase_s.max(0.0) % REPEAT_S / DT_S + 0.5) as i64;
-        SignalClock { offset_ticks, program: Program::of(lights) }
+        SignalClock { offset_ticks, program: Program::of(program) }
     }
 
     /// Colour of a signal (an index in `RoadMap::signals`) at a tick.
@@ -128,7 +128,9 @@ impl SignalClock {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        trace.word(self.offset_ticks as u64);
+        // No tick changes the program.
+        let SignalClock { offset_ticks, program: _ } = *self;
+        trace.word(offset_ticks as u64);
     }
 }
 
@@ -139,11 +141,11 @@ mod tests {
     use avastra_lang::model::vocabulary::Word;
 
     fn program() -> Program {
-        Program::of(LightProgram::default())
+        Program::of(SignalProgram::default())
     }
 
     fn clock(phase_s: f64) -> SignalClock {
-        SignalClock::new(phase_s, LightProgram::default())
+        SignalClock::new(phase_s, SignalProgram::default())
     }
 
     #[test]

@@ -145,9 +145,20 @@ impl Stroller {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        let Stroller { station_m, left_m, speed_mps, wants_left_m, aside_mps, .. } = *self;
+        let Stroller {
+            station_m,
+            left_m,
+            speed_mps,
+            wants_left_m,
+            aside_mps,
+            is_oncoming,
+            is_blocked,
+            looks_now,
+            // It follows from the station.
+            height_m: _,
+        } = *self;
         trace.numbers([station_m, left_m, speed_mps, wants_left_m, aside_mps]);
-        trace.words([self.is_oncoming, self.is_blocked, self.looks_now].map(u64::from));
+        trace.flags([is_oncoming, is_blocked, looks_now]);
     }
 }
 

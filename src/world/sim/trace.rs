@@ -53,6 +53,13 @@ impl Trace {
         numbers.into_iter().for_each(|number| self.number(number));
     }
 
+    /// Which of up to 64 things there are, in one word: fed before them, it keeps what there is from being taken for what is not.
+    #[inline]
+    pub fn flags<const N: usize>(&mut self, flags: [bool; N]) {
+        const { assert!(N <= 64, "a flag is a bit of a word") };
+        self.word(flags.into_iter().enumerate().fold(0, |bits, (nth, is_so)| bits | u64::from(is_so) << nth));
+    }
+
     /// SHA-256 over what the words up to now left.
     pub fn digest(&self) -> [u8; 32] {
         let mut hash = Sha256::new();

@@ -148,9 +148,7 @@ impl TrafficProfile {
 
     /// Digest of all settings, `sha256:` and 64 digits.
     pub fn digest(&self) -> String {
-        let text = serde_json::to_string(self).expect("a profile is plain data");
-        // Profiles that were recorded before there was this setting keep their digests.
-        digest(text.replace("\"takes_right\":false,", "").as_bytes())
+        digest(serde_json::to_string(self).expect("a profile is plain data").as_bytes())
     }
 }
 

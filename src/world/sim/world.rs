@@ -39,7 +39,7 @@ use super::traffic::TrafficProfile;
 
 /// Name of this simulated world. Raised whenever the same seed no longer gives the same episode and trace, so that an
 /// old scenario is told apart from a refuted one.
-pub const ENGINE: &str = "plane/8";
+pub const ENGINE: &str = "plane/9";
 
 /// One physics step, s: 50 Hz.
 pub const DT_S: f64 = TICK_MS as f64 / 1000.0;
@@ -184,7 +184,7 @@ impl World {
             ego_passed: None,
             conditions: environment.conditions(speed_mps),
             environment,
-            signals: SignalClock::new(start.signal_phase_s, scene.lights),
+            signals: SignalClock::new(start.signal_phase_s, scene.signal_program),
             switch: None,
             signals_until: Vec::new(),
             users: Vec::with_capacity(COMMANDED_MAX as usize),
@@ -443,28 +443,54 @@ impl World {
         }
     }
 
-    /// Feeds every bit of the state that later ticks depend on to `trace`, in a fixed order.
+    /// Feeds every bit of the state that later ticks depend on to `trace`, in a fixed order. Here and in what it calls, the
+    /// pattern names every field, so that a new one cannot be forgotten.
     pub fn trace(&self, trace: &mut Trace) {
-        trace.word(self.ticks);
-        self.ego.trace(trace);
-        trace.numbers([self.ego_station_m, self.ego_offset_m]);
-        trace.word(u64::from(self.red_runs));
-        PassedLight::trace(self.ego_passed.as_ref(), trace);
-        self.environment.trace(trace);
-        trace.number(self.conditions.friction);
-        self.signals.trace(trace);
-        if let Some(Switch { signal, colour, at_m }) = self.switch {
+        let World {
+            ticks,
+            ego,
+            ego_station_m,
+            ego_offset_m,
+            red_runs,
+            ego_passed,
+            environment,
+            conditions,
+            signals,
+            switch,
+            users,
+            next_id,
+            ambient,
+            weather_tick,
+            seed,
+            reactions,
+            // No tick changes these.
+            scene: _,
+            traffic: _,
+            // It follows from the station.
+            ego_elevation_m: _,
+            // No tick reads these.
+            contacts: _,
+            incidents: _,
+            signals_until: _,
+        } = self;
+        trace.word(*ticks);
+        ego.trace(trace);
+        trace.numbers([*ego_station_m, *ego_offset_m]);
+        trace.word(u64::from(*red_runs));
+        PassedLight::trace(ego_passed.as_ref(), trace);
+        environment.trace(trace);
+        // All but the friction follows from the environment.
+        trace.number(conditions.friction);
+        signals.trace(trace);
+        trace.flags([switch.is_some()]);
+        if let Some(Switch { signal, colour, at_m }) = *switch {
             trace.words([signal as u64, colour as u64]);
             trace.number(at_m);
         }
-        trace.word(u64::from(self.next_id));
-        self.ambient.trace(trace);
-        trace.words([self.weather_tick, self.seed]);
-        // Nothing is fed for the usual order, as before there was another.
-        if self.reactions != 0 {
-            trace.word(self.reactions);
-        }
-        for user in &self.users {
+        trace.word(u64::from(*next_id));
+        ambient.trace(trace);
+        trace.words([*weather_tick, *seed, *reactions, users.len() as u64]);
+        for user in users {
             user.trace(trace);
         }
     }

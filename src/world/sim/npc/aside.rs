@@ -56,17 +56,23 @@ impl Aside {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        trace.word(self.lane.map_or(0, |lane| lane as u64 + 1));
-        let told = match self.told {
-            None => 0.0,
-            Some(AsideBy::Speed(mps)) => mps,
-            Some(AsideBy::Time(takes_s)) => -takes_s,
+        let Aside { lane, was_told_midway, wanted_m, now_m, told, shift } = *self;
+        let (by_speed, by_time) = match told {
+            None => (None, None),
+            Some(AsideBy::Speed(mps)) => (Some(mps), None),
+            Some(AsideBy::Time(takes_s)) => (None, Some(takes_s)),
         };
-        trace.numbers([self.wanted_m, self.now_m, told]);
-        if self.was_told_midway {
-            trace.word(1);
-        }
-        if let Some(Shift { from_m, to_m, progress, duration_s }) = self.shift {
+        trace.flags([
+            lane.is_some(),
+            was_told_midway,
+            by_speed.is_some(),
+            by_time.is_some(),
+            shift.is_some(),
+        ]);
+        trace.words(lane.map(|lane| lane as u64));
+        trace.numbers([wanted_m, now_m]);
+        trace.numbers(by_speed.or(by_time));
+        if let Some(Shift { from_m, to_m, progress, duration_s }) = shift {
             trace.numbers([from_m, to_m, progress, duration_s]);
         }
     }

@@ -26,7 +26,7 @@ use crate::sim::way::{Way, body_at};
 use crate::sim::world::DT_S;
 
 use super::aside::Aside;
-use super::change::{Change, PlannedChange};
+use super::change::{BrokenOff, Change, PlannedChange};
 use super::leader::{Leader, TIME_GAP_S, following};
 use super::manners::GIVE_UP_S;
 use super::pursuit::Pursuit;
@@ -343,45 +343,72 @@ impl Driver {
     /// Feeds every bit that later ticks depend on to `trace`; ways follow from the draws
     /// and from what it was told for the next junction.
     pub fn trace(&self, trace: &mut Trace) {
-        trace.numbers([self.station_m, self.speed_mps, self.cruise_mps]);
-        let leader = self.leader.unwrap_or(Leader::line(-1.0));
-        trace.numbers([leader.gap_m, leader.speed_mps]);
-        trace.word(u64::from(leader.crosswise));
-        trace.numbers([self.hold_m.unwrap_or(f64::INFINITY), self.insists_to_m, self.stopped_to_m]);
-        trace.words([self.waited_ticks, self.aggression].map(u64::from));
-        if let Some(rate_mps2) = self.ordered_mps2 {
-            trace.number(rate_mps2);
+        let Driver {
+            station_m,
+            speed_mps,
+            cruise_mps,
+            ordered_mps2,
+            time_gap_s,
+            aggression,
+            leader,
+            hold_m,
+            insists_to_m,
+            stopped_to_m,
+            waited_ticks,
+            change,
+            aside,
+            ignores,
+            has_siren,
+            pursuit,
+            turn,
+            last_change,
+            plan,
+            draws,
+            limit_part,
+            yields_to_ego,
+            // The way follows from where it appeared and from what it drew, changed and was told since.
+            way: _,
+            // Rules permit what is then seen in `change`.
+            lane_changes: _,
+        } = self;
+        trace.flags([
+            leader.is_some(),
+            hold_m.is_some(),
+            ordered_mps2.is_some(),
+            change.is_some(),
+            aside.is_some(),
+            pursuit.is_some(),
+            turn.is_some(),
+            last_change.is_some(),
+            limit_part.is_some(),
+            *has_siren,
+            *yields_to_ego,
+        ]);
+        trace.numbers([*station_m, *speed_mps, *cruise_mps, *time_gap_s, *insists_to_m, *stopped_to_m]);
+        trace.words([*waited_ticks, *aggression, *draws].map(u64::from));
+        trace.words([u64::from(ignores.bits()), plan.len() as u64]);
+        if let Some(Leader { gap_m, speed_mps, crosswise }) = *leader {
+            trace.numbers([gap_m, speed_mps]);
+            trace.flags([crosswise]);
         }
-        if let Some(change) = &self.change {
-            trace.numbers([change.to_station_m, change.progress, change.duration_s]);
-            if change.ends_m != self.aside_m() {
-                trace.number(change.ends_m);
-            }
-            if let Some(first) = change.broken_off {
-                trace.numbers([first.progress, first.duration_s]);
+        trace.numbers(hold_m.iter().chain(ordered_mps2).chain(limit_part).copied());
+        if let Some(Change { to: _, to_station_m, progress, duration_s, ends_m, broken_off }) = change {
+            trace.numbers([*to_station_m, *progress, *duration_s, *ends_m]);
+            trace.flags([broken_off.is_some()]);
+            if let Some(BrokenOff { progress, duration_s }) = *broken_off {
+                trace.numbers([progress, duration_s]);
             }
         }
-        if let Some(aside) = &self.aside {
+        if let Some(aside) = aside {
             aside.trace(trace);
         }
-        // Nothing is fed for one that ignores nothing, as before it could.
-        if !self.ignores.is_empty() {
-            trace.word(u64::from(self.ignores.bits()));
-        }
-        if self.has_siren {
-            trace.word(1);
-        }
-        if let Some(pursuit) = &self.pursuit {
+        if let Some(pursuit) = pursuit {
             pursuit.trace(trace);
         }
-        if let Some(turn) = self.turn {
+        if let Some(turn) = turn {
             turn.trace(trace);
         }
-        if self.time_gap_s != TIME_GAP_S {
-            trace.number(self.time_gap_s);
-        }
-        trace.word(self.last_change.map_or(0, |side| side as u64 + 1));
-        trace.words([self.plan.len() as u64, u64::from(self.draws)]);
+        trace.words(last_change.map(|side| side as u64));
     }
 }
 

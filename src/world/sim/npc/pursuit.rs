@@ -72,14 +72,18 @@ impl Pursuit {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        let (kind, numbers) = match self.aim {
-            Aim::Gap(Gap::Way(gap_m), to) => (1, [gap_m, to.map_or(0.0, f64::from)]),
-            Aim::Gap(Gap::Time(gap_s), to) => (2, [gap_s, to.map_or(0.0, f64::from)]),
-            Aim::Place { early_s, station_m } => (3, [early_s, station_m.unwrap_or(f64::INFINITY)]),
+        let Pursuit { aim, speed_mps_max, crosses_in, is_met } = *self;
+        let (kind, to, numbers) = match aim {
+            Aim::Gap(Gap::Way(gap_m), to) => (0, to, [gap_m, 0.0]),
+            Aim::Gap(Gap::Time(gap_s), to) => (1, to, [gap_s, 0.0]),
+            Aim::Place { early_s, station_m } => (2, None, [early_s, station_m.unwrap_or(f64::INFINITY)]),
         };
-        trace.words([kind, u64::from(self.is_met), self.crosses_in.map_or(0, |lane| lane.0 as u64 + 1)]);
+        trace.flags([to.is_some(), crosses_in.is_some(), speed_mps_max.is_some(), is_met]);
+        trace.word(kind);
+        trace.words(to.map(u64::from));
+        trace.words(crosses_in.map(|lane| lane.0 as u64));
         trace.numbers(numbers);
-        trace.number(self.speed_mps_max.unwrap_or(f64::INFINITY));
+        trace.numbers(speed_mps_max);
     }
 }
 

@@ -19,7 +19,8 @@ pub(super) struct MeantTurn {
 
 impl MeantTurn {
     pub fn trace(self, trace: &mut Trace) {
-        trace.words([self.to as u64 + 1, self.lane.map_or(0, |lane| lane.0 as u64 + 1)]);
+        let MeantTurn { to, lane } = self;
+        trace.words([to as u64, lane.map_or(0, |lane| lane.0 as u64 + 1)]);
     }
 }
 

@@ -119,8 +119,8 @@ fn laid(setup: &Setup, row: &Row, map_file: &str) -> Result<RowFile, String> {
     let happened_s = vec![f64::NEG_INFINITY; space.actions.len()];
     let situation = Situation {
         memory: &setup.memory,
-        road: setup.road,
-        rules: setup.rules,
+        road: setup.road(),
+        rules: &setup.rules,
         surroundings: &world,
         seed: setup.seed,
         step: 0,
@@ -149,17 +149,17 @@ fn laid(setup: &Setup, row: &Row, map_file: &str) -> Result<RowFile, String> {
     }
     let duration_s = space.episode.step_s * f64::from(space.episode.step_limit);
     let cast =
-        Cast { road: setup.road, ego_front_m: world.moment_facts().ego_front_m, newcomers, duration_s };
+        Cast { road: setup.road(), ego_front_m: world.moment_facts().ego_front_m, newcomers, duration_s };
     let file = file(setup, row, &seen, &cast, map_file)?;
     let values = values(setup, row, &draw);
-    Ok(RowFile { action: row.action, map_path: setup.road.map_path.clone(), file, values })
+    Ok(RowFile { action: row.action, map_path: setup.road().map_path.clone(), file, values })
 }
 
 /// The document of a row; its parameters are declared where templates are made.
 fn file(setup: &Setup, row: &Row, seen: &Recorder, cast: &Cast, map_file: &str) -> Result<Element, String> {
     let space = setup.table.space();
     let action = &space.actions[row.action];
-    let road = setup.road;
+    let road = setup.road();
     let description = action.docs.first().map_or_else(|| action.name.clone(), Clone::clone);
     // The file of the map need not have the limit of the road, and OpenSCENARIO has no place for one.
     let limit_mps = road.facts.map_limits_mps[1];
