@@ -56,6 +56,43 @@ fn every_code_is_provoked_and_every_error_twice() {
     assert!(missing.is_empty(), "{}", missing.join("\n"));
 }
 
+/// The rules of docs/maintaining.md, as far as a machine can see them.
+#[test]
+fn every_message_is_worded_for_authors() {
+    let mut mistakes = Vec::new();
+    for (stem, path) in cases("diagnostics") {
+        for found in all(&loaded(&path, None)) {
+            let labels = found.labels.iter().map(|label| label.text.as_str());
+            let texts = [found.message.as_str()].into_iter().chain(labels).chain(found.help.as_deref());
+            for text in texts.chain(found.notes.iter().map(String::as_str)) {
+                // What stands in backticks is the author's, or to be written.
+                let own: String = text.split('`').step_by(2).collect::<Vec<_>>().join("…");
+                let is_long = |number: &str| number.split('.').nth(1).is_some_and(|digits| digits.len() > 6);
+                let mut numbers = own.split(|c: char| !c.is_ascii_digit() && c != '.');
+                let why = match () {
+                    () if own.starts_with(char::is_uppercase) && !is_a_name(&own) => "begins upper case",
+                    () if own.ends_with('.') => "ends with a full stop",
+                    () if ["::", "Some(", "Ok(", "Err(", "pest", "serde"]
+                        .iter()
+                        .any(|word| own.contains(word)) =>
+                    {
+                        "names Rust or a library"
+                    }
+                    () if numbers.any(is_long) => "has a number that no author wrote",
+                    () => continue,
+                };
+                mistakes.push(format!("{stem}: {why}: {text}"));
+            }
+        }
+    }
+    assert!(mistakes.is_empty(), "{}", mistakes.join("\n"));
+}
+
+/// Whether the words are not ours: a code point, or what the system says.
+fn is_a_name(text: &str) -> bool {
+    text.starts_with("U+") || text.contains("(os error ")
+}
+
 /// If a file nearby declares an unknown name, the diagnostic says which `use` is missing.
 #[test]
 fn a_missing_use_is_named() {

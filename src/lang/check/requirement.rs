@@ -9,7 +9,7 @@ use crate::model::requirement::{margin_dimension, open_divisor, past_inside};
 use crate::model::vocabulary::{BEGINS, BREACHED, EVENTS, MARGIN, NearWord, PastWord, Site, Word, things};
 use crate::model::{BodyWord, RequirementDef, RuleDef, TICK_MS, Type, code};
 use crate::syntax::ast::{ItemKind, Span};
-use crate::syntax::{Diagnostic, ast};
+use crate::syntax::{Diagnostic, ast, print_expr};
 use avastra_base::units::{Dimension, Rational};
 
 /// The most requirements of a space: a set of them fits one integer, and each is judged at every tick.
@@ -307,7 +307,7 @@ impl Checker {
         match ticks.filter(is_possible) {
             Some(ticks) => Some(ticks.to_f64().ceil() as u32),
             None => {
-                let message = format!("a requirement cannot wait {} s", exact_s.to_f64());
+                let message = format!("a requirement cannot wait `{}`", print_expr(time));
                 let error = Diagnostic::error(code::SETTING, message);
                 let wanted = format!("must be at least a tick of {TICK_MS} ms and at most {WITHIN_S_MAX} s");
                 self.reject(error.at(found.span, wanted).help(help))

@@ -362,14 +362,15 @@ impl<'a> Reader<'a> {
         let step_s = self.space.episode.step_s;
         let ticks = (after_s * 1000.0 / TICK_MS as f64).round();
         if !(0.0..step_s).contains(&after_s) {
-            let message = format!("`after {after_s} s` is not within the step");
+            let message = format!("`after {}` is not within the step", print_expr(after));
             let error = Diagnostic::error(code::TRIGGER, message);
             let error = error.at(after.span, format!("a step lasts {step_s} s"));
             return self
                 .reject(error.help("write the action in a later step, and the rest of the time here"));
         }
         if (ticks * TICK_MS as f64 / 1000.0 - after_s).abs() > 1e-9 {
-            let error = Diagnostic::error(code::TRIGGER, format!("nothing happens after {after_s} s"));
+            let message = format!("nothing happens after `{}`", print_expr(after));
+            let error = Diagnostic::error(code::TRIGGER, message);
             // The end of the step belongs to the next one.
             let last = (step_s * 1000.0 / TICK_MS as f64).round() - 1.0;
             let near = ticks_s(ticks.min(last) as u32);
