@@ -1,6 +1,7 @@
 //! Actions and groups: parameters with their domains, effects with the engine's words.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use crate::check::checker::{Checker, docs, each, literal};
 use crate::check::declaration::{even_odds, unknown_word};
@@ -59,7 +60,7 @@ impl Checker {
             }
             let names = action.iter().flat_map(|action: &ActionDef| &action.parameters);
             self.parameter_names.extend(names.map(|parameter| parameter.name.to_string()));
-            self.actions.push(action);
+            self.actions.push(action.map(Arc::new));
         }
     }
 
@@ -212,8 +213,8 @@ impl Checker {
             domain => domain,
         };
         if let Domain::Values(values) = &domain {
-            self.listed += values.len();
-            if self.listed > LISTED_MAX {
+            self.spent.listed += values.len();
+            if self.spent.listed > LISTED_MAX {
                 let message = format!("the parameters list more than {LISTED_MAX} values together");
                 let error =
                     Diagnostic::error(code::TOO_MUCH, message).at(declared.span, "here the limit is passed");
@@ -413,8 +414,8 @@ impl Checker {
                 continue;
             }
             let actions = self.all_targets(&declared.members);
-            self.members += actions.len();
-            if self.members > MEMBERS_MAX {
+            self.spent.members += actions.len();
+            if self.spent.members > MEMBERS_MAX {
                 let message = format!("the groups name more than {MEMBERS_MAX} actions together");
                 let error = Diagnostic::error(code::TOO_MUCH, message);
                 let error = error.at(declared.name.span, "here the limit is passed");
@@ -431,7 +432,8 @@ impl Checker {
     pub(super) fn declare_also(&mut self, items: &[&ast::Item]) {
         for (_, declared) in each(items, ItemKind::as_also) {
             for (action, effect) in self.also(declared) {
-                self.actions[action].iter_mut().for_each(|known| known.effects.push(effect.clone()));
+                let known = self.actions[action].as_mut().map(Arc::make_mut);
+                known.into_iter().for_each(|known| known.effects.push(effect.clone()));
             }
             if self.has_compiled_too_much(declared.on.first().map_or(Span::NONE, |name| name.span)) {
                 return;
@@ -452,11 +454,11 @@ impl Checker {
             let place = Place { locals: &locals, owner: Some(&owner), states: true, ..Place::default() };
             for effect in &declared.effects {
                 for effect in self.effect(effect, &place).into_iter().flatten() {
-                    self.compiled += operations_of(&effect);
+                    self.spent.compiled += operations_of(&effect);
                     added.push((action, effect));
                 }
             }
-            if self.compiled > COMPILED_MAX {
+            if self.spent.compiled > COMPILED_MAX {
                 break;
             }
         }
@@ -483,7 +485,7 @@ impl Checker {
 
     /// Whether more than [`COMPILED_MAX`] operations were compiled for single actions; reports that once.
     pub(super) fn has_compiled_too_much(&mut self, span: Span) -> bool {
-        let is_passed = self.compiled > COMPILED_MAX;
+        let is_passed = self.spent.compiled > COMPILED_MAX;
         if is_passed && !self.diagnostics.iter().any(|one| one.code == code::TOO_MUCH) {
             let message = "the rules and `on … also` of many actions are too much to check";
             let error = Diagnostic::error(code::TOO_MUCH, message).at(span, "here the limit is passed");
@@ -553,7 +555,8 @@ impl Checker {
     pub(super) fn count_rows(&mut self, rules: &[RuleDef], roads: usize) {
         let mut total = 0_u64;
         // A count of 0 means that an axis is broken, which is reported where it is declared.
-        let size = |action: &Option<ActionDef>| action.as_ref().map(product_size).filter(|count| *count > 0);
+        let size =
+            |action: &Option<Arc<ActionDef>>| action.as_deref().map(product_size).filter(|count| *count > 0);
         self.row_counts = self.actions.iter().map(size).collect();
         for (action, count) in self.actions.iter().zip(&self.row_counts) {
             let (Some(action), Some(count)) = (action, *count) else { continue };

@@ -5,11 +5,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use crate::check::names::{Names, unknown};
 use crate::check::references::{References, Symbol};
 use crate::check::report::Report;
+use crate::check::requirement::Required;
 use crate::check::road::Maps;
+use crate::check::rule::Doers;
 use crate::check::{style, unused};
 use crate::model::command::Told;
 use crate::model::effort;
@@ -24,7 +27,7 @@ use crate::prove;
 use crate::prove::{Known, RunsIn, enclose, product_size};
 use crate::syntax::ast::{FileId, ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
-use avastra_base::units::{Dimension, Rational};
+use avastra_base::units::Rational;
 
 /// The most diagnostics of a file: more are of no use, and each is found in the text by its place.
 pub(super) const DIAGNOSTICS_MAX: usize = 1_000;
@@ -35,10 +38,31 @@ const STEPS_MAX: u64 = 20_000_000;
 /// A function's parameters, its result type, and the span of its header.
 pub(super) type Signature = (Vec<(String, Type)>, Type, Span);
 
-/// The declarations that are checked so far, and their diagnostics.
+/// Names that are known before any declaration is checked.
+#[derive(Default)]
+pub(super) struct Announced {
+    /// Of all functions: constants are checked before them and cannot call them.
+    pub functions: BTreeSet<String>,
+    /// Of every declared road, driven or not.
+    pub roads: Vec<String>,
+}
+
+/// How much was made of a short text so far. What is too much is refused before it takes long.
+#[derive(Default)]
+pub(super) struct Spent {
+    /// Values that parameters list.
+    pub listed: usize,
+    /// Actions that groups name.
+    pub members: usize,
+    /// Operations that were compiled for single actions, in conditions of rules and in what `on … also` adds.
+    pub compiled: usize,
+}
+
+/// The declarations that are checked so far, in the order of [`space`], and their diagnostics. A list of what comes later is
+/// empty.
 #[derive(Default)]
 pub(super) struct Checker {
-    pub(super) diagnostics: Vec<Diagnostic>,
+    pub(super) announced: Announced,
     pub(super) enum_names: Names,
     pub(super) enums: Vec<EnumDef>,
     pub(super) states: Vec<StateDef>,
@@ -58,46 +82,32 @@ pub(super) struct Checker {
     /// Positions in `constants`, by name.
     pub(super) constant_places: BTreeMap<String, usize>,
     pub(super) function_names: Names,
-    /// Every declared road, driven or not.
-    pub(super) road_names: Vec<String>,
-    /// Names of all functions. Constants are checked before them and cannot call them.
-    pub(super) functions_to_come: BTreeSet<String>,
     /// `None` stands for a function with a broken header.
     pub(super) signatures: Vec<Option<Signature>>,
     pub(super) functions: Vec<FnDef>,
     pub(super) action_names: Names,
-    pub(super) actions: Vec<Option<ActionDef>>,
+    pub(super) actions: Vec<Option<Arc<ActionDef>>>,
     /// The parameters of all actions.
     pub(super) parameter_names: BTreeSet<String>,
     /// Indices of actions with a broken effect: no rule reports that such an action lacks an effect.
     pub(super) half_broken: BTreeSet<usize>,
-    /// By state: the actions that set it. Empty until rules are checked.
-    pub(super) setters: Vec<Vec<usize>>,
-    /// The actions that spawn. Empty until rules are checked.
-    pub(super) spawners: Vec<usize>,
     pub(super) groups: Vec<GroupDef>,
     /// Positions in `groups`, by name.
     pub(super) group_places: BTreeMap<String, usize>,
-    /// Values that parameters list, so far.
-    pub(super) listed: usize,
-    /// Actions that groups name, so far.
-    pub(super) members: usize,
-    /// Operations that were compiled for single actions so far, in conditions of rules and in what `on … also` adds.
-    pub(super) compiled: usize,
     /// The effects of every step.
     pub(super) each_step: Vec<SetDef>,
-    /// Names of all requirements. Empty until they are checked.
-    pub(super) requirement_names: Names,
-    /// Those without a mistake, each with the dimension of its margin.
-    pub(super) requirement_margins: Vec<(String, Option<Dimension>)>,
+    /// `None` until they are checked.
+    pub(super) required: Option<Required>,
     /// Number of rows of each action; `None` if an axis is broken.
     pub(super) row_counts: Vec<Option<u64>>,
-    /// What each name stands for.
-    pub(super) references: References,
     /// The claims that rows run, as far as that was shown.
     pub(super) claims: Vec<Claim>,
     /// Declarations that are not checked, because another has their name.
     pub(super) doubles: BTreeSet<Span>,
+    /// What each name stands for, all through.
+    pub(super) references: References,
+    pub(super) spent: Spent,
+    pub(super) diagnostics: Vec<Diagnostic>,
     /// Whether diagnostics are dropped for now.
     pub(super) is_quiet: bool,
 }
@@ -144,13 +154,13 @@ pub(super) fn space(
     references: References,
     maps: Option<&mut dyn Maps>,
 ) -> Checked {
-    let mut checker = Checker { references, ..Checker::default() };
+    let announced = Announced {
+        functions: each(items, ItemKind::as_fn).map(|(_, function)| function.name.text.clone()).collect(),
+        roads: each(items, ItemKind::as_road).map(|(_, road)| road.name.text.clone()).collect(),
+    };
+    let mut checker = Checker { announced, references, ..Checker::default() };
     checker.declare_enums(items);
     checker.references.set_enums(checker.enums.clone());
-    let functions = each(items, ItemKind::as_fn);
-    checker.functions_to_come = functions.map(|(_, function)| function.name.text.clone()).collect();
-    let roads = each(items, ItemKind::as_road);
-    checker.road_names = roads.map(|(_, road)| road.name.text.clone()).collect();
     checker.declare_constants(items);
     checker.declare_odds(items);
     checker.declare_bodies(items);
@@ -182,7 +192,8 @@ pub(super) fn space(
         checker.look_at_expects(&own);
         return checker.finish(None, RunsIn::default());
     }
-    let actions: Vec<ActionDef> = core::mem::take(&mut checker.actions).into_iter().flatten().collect();
+    let actions = core::mem::take(&mut checker.actions).into_iter().flatten();
+    let actions: Vec<ActionDef> = actions.map(Arc::unwrap_or_clone).collect();
     let space = Space {
         path: root.path,
         meaning: root.meaning,
@@ -307,8 +318,9 @@ impl Checker {
     fn note_the_rest(&mut self, items: &[&ast::Item], aside: &[&ast::Item]) {
         let is_double = |item: &&&ast::Item| self.doubles.contains(&item.span);
         let doubles: Vec<&ast::Item> = items.iter().filter(is_double).copied().collect();
+        let doers = self.doers();
         for item in doubles.iter().chain(aside) {
-            self.quietly(|checker| checker.look_at_item(item));
+            self.quietly(|checker| checker.look_at_item(item, &doers));
         }
         for item in items.iter().chain(aside) {
             match item.kind.plain() {
@@ -321,7 +333,7 @@ impl Checker {
     }
 
     /// Looks at a declaration that does not stand: it is overridden, left out, or the second of its name.
-    fn look_at_item(&mut self, item: &ast::Item) {
+    fn look_at_item(&mut self, item: &ast::Item, doers: &Doers) {
         match item.kind.plain() {
             ItemKind::Odds(declared) if self.is_of_actions(declared) => drop(self.action_odds(declared)),
             ItemKind::Odds(declared) => drop(self.odds(declared)),
@@ -337,7 +349,7 @@ impl Checker {
             ItemKind::Group(declared) => declared.members.iter().for_each(|name| drop(self.targets(name))),
             ItemKind::Also(declared) => drop(self.also(declared)),
             ItemKind::EachStep(effects) => drop(self.sets(effects)),
-            ItemKind::Rule(declared) => drop(self.rule(declared)),
+            ItemKind::Rule(declared) => drop(self.rule(declared, doers)),
             ItemKind::Require(declared) => drop(self.requirement(item, declared)),
             ItemKind::Episode(fields) => drop(self.settings(fields)),
             ItemKind::Reward(cases) => drop(self.cases(item, cases)),

@@ -1,6 +1,7 @@
 //! Checks the declarations of enums, constants, functions and states.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use crate::check::checker::{Checker, Signature, docs, each};
 use crate::check::expression::{NUMBER_MAX, Place, is_beyond_states};
@@ -93,7 +94,8 @@ impl Checker {
         let of_actions = each(items, ItemKind::as_odds).find(|(_, declared)| self.is_of_actions(declared));
         let Some((_, declared)) = of_actions else { return };
         for (action, odds) in self.action_odds(declared).into_iter().enumerate() {
-            self.actions[action].iter_mut().for_each(|known| known.odds = odds.clone());
+            let known = self.actions[action].as_mut().map(Arc::make_mut);
+            known.into_iter().for_each(|known| known.odds = odds.clone());
         }
     }
 

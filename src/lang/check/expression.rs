@@ -573,7 +573,7 @@ impl Checker {
         self.references.uses(call.name.span, symbol);
         let Some(index) = self.function_names.get(&call.name.text) else {
             self.look_at_arguments(&call.args, place);
-            if self.functions_to_come.contains(&call.name.text) {
+            if self.announced.functions.contains(&call.name.text) {
                 let error = Diagnostic::error(code::NOT_HERE, "a constant cannot call functions");
                 return self
                     .reject(error.at(call.span, "called here").help("make it a `fn` without parameters"));

@@ -234,9 +234,9 @@ impl Checker {
             return self.reject(unknown_here("road", span, place.site));
         }
         let road = |name: &ast::Expr| match &name.kind {
-            ast::ExprKind::Name(text) if self.road_names.contains(text) => Some(text.clone()),
+            ast::ExprKind::Name(text) if self.announced.roads.contains(text) => Some(text.clone()),
             ast::ExprKind::Name(text) => {
-                let known = self.road_names.iter().map(String::as_str);
+                let known = self.announced.roads.iter().map(String::as_str);
                 self.reject(unknown("road", text, name.span, known))
             }
             _ => {

@@ -2,6 +2,7 @@
 
 use crate::check::checker::{Checker, docs};
 use crate::check::expression::Place;
+use crate::check::names::Names;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Comparison, Expr, ExprKind};
@@ -18,12 +19,20 @@ const REQUIREMENTS_MAX: usize = 64;
 /// The longest `within`, s: that of an observation period.
 const WITHIN_S_MAX: i64 = 600;
 
+/// The requirements of a space.
+#[derive(Default)]
+pub(super) struct Required {
+    names: Names,
+    /// Those without a mistake, each with the dimension of its margin.
+    margins: Vec<(String, Option<Dimension>)>,
+}
+
 impl Checker {
     /// All requirements. `--with` and `--without` name them as they do rules, so no rule has the name of one.
     pub(super) fn requirements(&mut self, items: &[&ast::Item], rules: &[RuleDef]) -> Vec<RequirementDef> {
         let mut requirements = Vec::new();
         let (names, all) = self.declared("requirement", items, ItemKind::as_require);
-        self.requirement_names = names;
+        let mut required = Required { names, margins: Vec::new() };
         if let Some((_, first)) = all.get(REQUIREMENTS_MAX) {
             let message = format!("more than {REQUIREMENTS_MAX} requirements");
             let error = Diagnostic::error(code::TOO_MUCH, message).at(first.name.span, "one too many");
@@ -40,9 +49,10 @@ impl Checker {
             }
             let requirement = self.requirement(item, declared);
             let margin = requirement.as_ref().map(|of| (of.name.clone(), of.margin));
-            self.requirement_margins.extend(margin);
+            required.margins.extend(margin);
             requirements.extend(requirement);
         }
+        self.required = Some(required);
         requirements
     }
 
@@ -131,7 +141,8 @@ impl Checker {
     ) -> Option<Option<Expr>> {
         let ast::ExprKind::Name(name) = &base.kind else { return None };
         // A requirement that is called `ego` takes nothing from the ego vehicle.
-        let index = self.requirement_names.get(name).filter(|_| !things().contains(&name.as_str()))?;
+        let required = self.required.as_ref().filter(|_| !things().contains(&name.as_str()))?;
+        let index = required.names.get(name)?;
         self.references.uses(base.span, Symbol::Requirement(name.clone()));
         let (known, sites) = match part.text.as_str() {
             word if word == BREACHED.0 => {
@@ -156,10 +167,12 @@ impl Checker {
             return Some(Some(Expr { kind: ExprKind::Breached(index), ty: Type::Bool, span }));
         }
         // A requirement with a mistake in it has none yet.
-        let Some((_, dimension)) = self.requirement_margins.iter().find(|(of, _)| of == name) else {
+        let margins = self.required.iter().flat_map(|required| &required.margins);
+        let Some(dimension) = margins.into_iter().find(|(of, _)| of == name).map(|(_, dimension)| *dimension)
+        else {
             return Some(None);
         };
-        let Some(dimension) = *dimension else {
+        let Some(dimension) = dimension else {
             let message = format!("`{name}` has no margin");
             let error =
                 Diagnostic::error(code::NOT_HERE, message).at(span, "words and `==` have no distance");

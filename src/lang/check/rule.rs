@@ -1,6 +1,7 @@
 //! Rules: the actions that each rule binds, and its condition compiled for each of these actions.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use crate::check::checker::{Checker, docs};
 use crate::check::expression::{Place, enum_of};
@@ -20,17 +21,29 @@ use crate::syntax::{Diagnostic, ast, listed};
 /// Operations that a condition with a mistake counts as, because checking it takes time for each action, too.
 const OPERATIONS_BROKEN: usize = 8;
 
+/// The actions by what they do.
+pub(super) struct Doers {
+    /// By state: those that set it.
+    setters: Vec<Vec<usize>>,
+    spawners: Vec<usize>,
+}
+
 impl Checker {
-    pub(super) fn rules(&mut self, items: &[&ast::Item]) -> Vec<RuleDef> {
-        self.setters = vec![Vec::new(); self.states.len()];
+    pub(super) fn doers(&self) -> Doers {
+        let mut doers = Doers { setters: vec![Vec::new(); self.states.len()], spawners: Vec::new() };
         for (index, action) in self.actions.iter().enumerate() {
             let Some(action) = action else { continue };
-            action.sets().for_each(|set| self.setters[set.state].push(index));
-            self.spawners.extend(action.spawns().map(|_| index));
+            action.sets().for_each(|set| doers.setters[set.state].push(index));
+            doers.spawners.extend(action.spawns().map(|_| index));
         }
+        doers
+    }
+
+    pub(super) fn rules(&mut self, items: &[&ast::Item]) -> Vec<RuleDef> {
+        let doers = self.doers();
         let mut rules = Vec::new();
         for (item, declared) in self.declared("rule", items, ItemKind::as_rule).1 {
-            let Some(body) = self.rule(declared) else { continue };
+            let Some(body) = self.rule(declared, &doers) else { continue };
             let (name, span) = (declared.name.text.clone(), declared.name.span);
             let start = self.start_condition(&declared.body);
             rules.push(RuleDef { name, docs: docs(item), optional: declared.optional, body, start, span });
@@ -38,12 +51,14 @@ impl Checker {
         rules
     }
 
-    pub(super) fn rule(&mut self, declared: &ast::Rule) -> Option<RuleBody> {
+    pub(super) fn rule(&mut self, declared: &ast::Rule, doers: &Doers) -> Option<RuleBody> {
         match &declared.body {
             ast::RuleBody::Holds { on, during, condition } => {
-                self.holds(declared, on, during.as_ref(), condition)
+                self.holds(declared, on, during.as_ref(), condition, doers)
             }
-            ast::RuleBody::Moves { state, key, moves } => self.moves(declared, state, key.as_ref(), moves),
+            ast::RuleBody::Moves { state, key, moves } => {
+                self.moves(declared, state, key.as_ref(), moves, doers)
+            }
         }
     }
 
@@ -53,6 +68,7 @@ impl Checker {
         on: &[ast::Name],
         during: Option<&ast::Name>,
         condition: &ast::Expr,
+        doers: &Doers,
     ) -> Option<RuleBody> {
         if self.has_compiled_too_much(rule.name.span) {
             return None;
@@ -75,7 +91,7 @@ impl Checker {
         }
         if on.is_empty() {
             targets = match during {
-                None => self.targets_of_global(rule, condition)?,
+                None => self.targets_of_global(rule, condition, doers)?,
                 Some(_) => {
                     let may_change = |action: &usize| {
                         self.actions[*action].as_ref().is_some_and(|action| self.changes_lanes(action))
@@ -88,20 +104,16 @@ impl Checker {
         let lacking = self.lacking_parameters(&rule.name, &targets, condition);
         let mut bindings = Vec::new();
         for action in targets {
-            // A broken action was reported where it is declared. A sound one is put back below.
-            let definition = match lacking.contains(&action) {
-                true => None,
-                false => self.actions[action].take(),
-            };
-            let Some(definition) = definition else {
+            // A broken action was reported where it is declared.
+            let sound = self.actions[action].clone().filter(|_| !lacking.contains(&action));
+            let Some(definition) = sound else {
                 let name = self.action_names.name(action).unwrap_or_default().to_owned();
                 self.look_at_condition(condition, &name);
                 continue;
             };
             let is_whole = !self.half_broken.contains(&action);
             let found = self.binding((rule, during), condition, (&definition, is_whole), site);
-            self.actions[action] = Some(definition);
-            self.compiled += condition_size(found.as_ref());
+            self.spent.compiled += condition_size(found.as_ref());
             bindings.extend(found.map(|condition| RuleBinding { action, condition }));
             if self.has_compiled_too_much(rule.name.span) {
                 return None;
@@ -135,11 +147,11 @@ impl Checker {
         let locals = definition.map_or(locals, |definition| definition.parameters.clone());
         let place = Place { locals: &locals, owner: Some(&owner), site: Site::Phase, ..Place::default() };
         let found = self.typed(condition, &place, Type::Bool);
-        self.compiled += condition_size(found.as_ref());
+        self.spent.compiled += condition_size(found.as_ref());
         // All that come to it.
         let before: Vec<usize> =
             (0..self.manoeuvres.len()).filter(|given| self.reached(*given).contains(&manoeuvre)).collect();
-        let gives = |action: &ActionDef| action.manoeuvres().any(|given| before.contains(&given));
+        let gives = |action: &Arc<ActionDef>| action.manoeuvres().any(|given| before.contains(&given));
         let mut actions = match on.is_empty() {
             true => (0..self.actions.len()).collect(),
             false => self.all_targets(on),
@@ -250,7 +262,12 @@ impl Checker {
     /// The actions that a rule without `on` binds. These are the actions that could break it: those that spawn,
     /// if the rule asks about spawns, and those that set a state which it reads. A rule that does neither, or asks for
     /// the time, binds all actions.
-    fn targets_of_global(&mut self, rule: &ast::Rule, condition: &ast::Expr) -> Option<Vec<usize>> {
+    fn targets_of_global(
+        &mut self,
+        rule: &ast::Rule,
+        condition: &ast::Expr,
+        doers: &Doers,
+    ) -> Option<Vec<usize>> {
         let named = names_in(condition);
         let names_some = named.iter().any(|name| self.parameter_names.contains(&name.text));
         let parameter = self.actions.iter().flatten().filter(|_| names_some).find_map(|action| {
@@ -278,9 +295,9 @@ impl Checker {
             false => self.half_broken.clone(),
         };
         match known {
-            Known::Spawn => bound.extend(&self.spawners),
+            Known::Spawn => bound.extend(&doers.spawners),
             // Where nothing spawns, nothing asks about a spawn.
-            _ => bound.extend(read.iter().flat_map(|state| &self.setters[*state])),
+            _ => bound.extend(read.iter().flat_map(|state| &doers.setters[*state])),
         }
         Some(bound.into_iter().filter(|index| self.actions[*index].is_some()).collect())
     }
@@ -332,6 +349,7 @@ impl Checker {
         state: &ast::Name,
         key: Option<&ast::Name>,
         moves: &[ast::Move],
+        doers: &Doers,
     ) -> Option<RuleBody> {
         let index = self.state_named(state);
         let definition = index.map(|index| self.states[index].clone());
@@ -395,7 +413,7 @@ impl Checker {
             |action: &usize| self.actions[*action].as_ref().is_some_and(|action| action.sets().any(may_set));
         let actions: BTreeSet<usize> = match self.each_step.iter().any(may_set) {
             true => (0..self.actions.len()).filter(is_sound).collect(),
-            false => self.setters[index].iter().copied().filter(sets).collect(),
+            false => doers.setters[index].iter().copied().filter(sets).collect(),
         };
         let actions: Vec<usize> = actions.into_iter().collect();
         if actions.is_empty() {

@@ -1,7 +1,7 @@
 //! The conditions of scenarios: `once ego.junction_ahead <= 40 m`. They may name states and functions of the space,
 //! facts of the moment, and road users by their number.
 
-use crate::check::checker::Checker;
+use crate::check::checker::{Announced, Checker};
 use crate::check::expression::Place;
 use crate::check::names::Names;
 use crate::model::expr::Expr;
@@ -24,7 +24,10 @@ pub(super) fn condition(space: &Space, written: &ast::Expr) -> Result<Expr, Vec<
     let mut checker = Checker {
         enums: space.enums.clone(),
         states: space.states.clone(),
-        road_names: space.roads.iter().map(|road| road.name.clone()).collect(),
+        announced: Announced {
+            roads: space.roads.iter().map(|road| road.name.clone()).collect(),
+            ..Announced::default()
+        },
         function_names,
         signatures: space.functions.iter().map(|function| Some(signature(function))).collect(),
         functions: space.functions.clone(),

@@ -122,11 +122,11 @@ impl Checker {
         let road = field(&fields, TrajectoryField::Road)?;
         let road_name = self.name_of(road, "a road")?;
         let Some(road) = roads.iter().flatten().find(|known| known.name == road_name) else {
-            if self.road_names.iter().any(|known| known == road_name) {
+            if self.announced.roads.iter().any(|known| known == road_name) {
                 // It has a mistake of its own.
                 return None;
             }
-            let names = self.road_names.iter().map(String::as_str);
+            let names = self.announced.roads.iter().map(String::as_str);
             let error = self.unknown("road", road_name, road.span, names);
             return self.reject(error);
         };
