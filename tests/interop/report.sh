@@ -14,9 +14,9 @@ mkdir -p "$work"
 binary=${AVASTRA:-$root/target/release/avastra}
 [ -n "${AVASTRA:-}" ] || (cd "$root" && cargo build --release --quiet)
 
-if [ ! -d "$work/node_modules/axe-core" ] || [ ! -d "$work/node_modules/prettier" ]; then
+if [ ! -d "$work/node_modules/axe-core" ] || [ ! -d "$work/node_modules/typescript" ]; then
   [ -f "$work/package.json" ] || echo '{"private": true}' > "$work/package.json"
-  (cd "$work" && npm install --no-audit --no-fund --silent puppeteer-core axe-core eslint @eslint/js globals prettier)
+  (cd "$work" && npm install --no-audit --no-fund --silent puppeteer-core axe-core eslint @eslint/js globals prettier typescript)
 fi
 
 # The linter reads each module. That a name stands once in all of them, which become one script, shows when the page opens.
@@ -25,6 +25,8 @@ rm -rf "$work/lint" && mkdir "$work/lint"
 cp "$root"/src/exchange/report/page/*.js "$work/lint"
 (cd "$work" && npx prettier --print-width 120 --check "lint/*.js" > lint.txt) || { cat "$work/lint.txt"; exit 1; }
 (cd "$work" && npx eslint --max-warnings 0 lint)
+# The modules hold to the shapes of `data.d.ts`.
+"$work/node_modules/.bin/tsc" -p "$root/src/exchange/report/page"
 for file in "$root"/src/exchange/report/page/*; do
   [ "$(wc -l < "$file")" -lt 350 ] || { echo "$file is too long"; exit 1; }
 done

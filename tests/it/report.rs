@@ -1,5 +1,6 @@
 //! The page that `avastra report` writes: it holds everything, asks for nothing, and says what the world did.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use avastra::action::ActionTable;
@@ -177,8 +178,8 @@ scenario told {
     assert!((again_s - 12.0).abs() < 0.05, "{told:?}");
 }
 
-#[test]
-fn a_page_draws_the_margins_of_what_was_breached() {
+/// The page of a scenario in which a requirement is breached.
+fn breached_page() -> String {
     const TOLD: &str = "language 1
 use \"roads.ava\"
 require slow when ego.speed >= 2 m/s: ego.speed <= 9 m/s within 1 s
@@ -194,7 +195,12 @@ scenario told {
     let scenario = loaded.scenario.expect("it has a scenario");
     let table = ActionTable::new(loaded.space.expect("its space is sound"));
     let ads = recorded(&scenario).expect("its driving system exists");
-    let html = page_of(record(&table, &scenario, &ads, TOLD).expect("it plays"));
+    page_of(record(&table, &scenario, &ads, TOLD).expect("it plays"))
+}
+
+#[test]
+fn a_page_draws_the_margins_of_what_was_breached() {
+    let html = breached_page();
     let (header, columns) = unpacked(&html, "s0");
     let column = |number: &Value| &columns[number.as_u64().unwrap() as usize];
     let speeds = column(&header["ego"]["speed_mps"]);
@@ -242,6 +248,75 @@ fn a_page_holds_everything_and_repeats_itself() {
     let index = index_of(&html);
     assert_eq!(index["scenarios"][0]["summary"]["name"], "walk");
     assert!(html.len() < 155_000, "{} bytes for one short scenario", html.len());
+}
+
+/// The fields of each interface of `data.d.ts`, and whether each may be missing.
+fn shapes() -> BTreeMap<String, BTreeMap<String, bool>> {
+    let text = std::fs::read_to_string(root().join("src/exchange/report/page/data.d.ts"));
+    let text = text.expect("it is there");
+    let mut shapes: BTreeMap<String, BTreeMap<String, bool>> = BTreeMap::new();
+    let mut current = None;
+    for line in text.lines() {
+        if let Some(header) = line.strip_prefix("export interface ") {
+            let mut words = header.trim_end_matches(" {").split(" extends ");
+            let name = words.next().expect("an interface has a name").to_owned();
+            let inherited = words.next().map(|base| shapes[base].clone()).unwrap_or_default();
+            shapes.insert(name.clone(), inherited);
+            current = Some(name);
+        } else if line == "}" {
+            current = None;
+        } else if let (Some(name), Some((field, _))) = (&current, line.trim().split_once(": ")) {
+            let may_lack = field.ends_with('?');
+            let fields = shapes.get_mut(name).expect("it was begun");
+            fields.insert(field.trim_end_matches('?').to_owned(), may_lack);
+        }
+    }
+    shapes
+}
+
+/// What the page's modules are checked against is what is written.
+#[test]
+fn the_data_of_a_page_has_the_shapes_that_its_modules_read() {
+    let shapes = shapes();
+    let mut seen = BTreeSet::new();
+    let mut holds = |shape: &str, value: &Value| {
+        let fields = value.as_object().unwrap_or_else(|| panic!("{shape}: {value}"));
+        for name in fields.keys() {
+            assert!(shapes[shape].contains_key(name), "{shape}.{name} is written and not declared");
+        }
+        for (name, may_lack) in &shapes[shape] {
+            assert!(*may_lack || fields.contains_key(name), "{shape}.{name} is declared and not written");
+        }
+        seen.insert(shape.to_owned());
+    };
+    let each = |value: &Value| value.as_array().expect("a list").clone();
+    let (table, scenario, ads) = walk();
+    let walked = page_of(record(&table, &scenario, &ads, SOURCE).expect("it plays"));
+    for html in &[walked, breached_page()] {
+        let index = index_of(html);
+        holds("Index", &index);
+        holds("Quantisation", &index["quantisation"]);
+        each(&index["scenarios"]).iter().for_each(|entry| holds("Entry", entry));
+        let (header, _) = unpacked(html, "s0");
+        holds("Header", &header);
+        holds("Summary", &header["summary"]);
+        each(&header["summary"]["collisions"]).iter().for_each(|one| holds("Finding", one));
+        each(&header["summary"]["breaches"]).iter().for_each(|one| holds("Breach", one));
+        for collision in each(&header["collisions"]) {
+            holds("Collision", &collision);
+            each(&collision["ways"]).iter().for_each(|way| holds("Way", way));
+        }
+        let lists =
+            [("steps", "Step"), ("obstacles", "Obstacle"), ("tracks", "Track"), ("margins", "Margin")];
+        for (list, shape) in lists {
+            each(&header[list]).iter().for_each(|one| holds(shape, one));
+        }
+        holds("Ego", &header["ego"]);
+        holds("Plans", &header["plans"]);
+    }
+    // A recurrence stands in files that claim one.
+    let unseen: Vec<&String> = shapes.keys().filter(|shape| !seen.contains(*shape)).collect();
+    assert_eq!(unseen, ["Recurrence"]);
 }
 
 /// `sh scenarios/found/make.sh` draws it again, should the engine or the driving system change.

@@ -151,12 +151,19 @@ fn blob(blobs: &mut String, id: &str, packed: &str) {
     let _ = writeln!(blobs, "<script type=\"text/plain\" id=\"{id}\">{packed}</script>");
 }
 
-/// All modules as one script.
+/// All modules as one script, without their documentation.
 fn script() -> String {
     let mut script = String::from("(() => {\n\"use strict\";\n");
     for module in MODULES {
-        let mut is_import = false;
+        let (mut is_import, mut is_doc) = (false, false);
         for line in module.lines() {
+            // A cast begins as documentation does, and has code behind it.
+            let code = line.trim_start();
+            is_doc |= code.starts_with("/**") && (!code.contains("*/") || code.ends_with("*/"));
+            if is_doc {
+                is_doc = !code.ends_with("*/");
+                continue;
+            }
             is_import |= line.starts_with("import ");
             if is_import {
                 is_import = !line.ends_with(';');

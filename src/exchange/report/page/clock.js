@@ -3,7 +3,14 @@
 export const RATES = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 
 export class Clock {
-  /** `changed` is called with each new time. */
+  /** The frame that is due while it plays. */
+  #frame = 0;
+
+  /**
+   * @param {number} endS
+   * @param {number} tickS
+   * @param {(timeS: number) => void} changed is called with each new time.
+   */
   constructor(endS, tickS, changed) {
     this.endS = endS;
     this.tickS = tickS;
@@ -13,15 +20,20 @@ export class Clock {
     this.playing = false;
   }
 
+  /** @param {number} timeS */
   seek(timeS) {
     this.timeS = Math.min(Math.max(timeS, 0), this.endS);
     this.changed(this.timeS);
   }
 
-  /** Goes some ticks on or back, onto a tick. */
+  /**
+   * Goes some ticks on or back, onto a tick.
+   * @param {number} count
+   */
   ticks(count) {
     this.pause();
-    const now = Math.round(this.timeS / this.tickS + (count > 0 ? -1e-6 : 1e-6));
+    const at = this.timeS / this.tickS;
+    const now = count > 0 ? Math.floor(at + 1e-6) : Math.ceil(at - 1e-6);
     this.seek((now + count) * this.tickS);
   }
 
@@ -30,20 +42,26 @@ export class Clock {
     if (this.timeS >= this.endS - 1e-6) this.timeS = 0;
     this.playing = true;
     let before = performance.now();
-    const frame = (now) => {
-      if (!this.playing) return;
+    const frame = (/** @type {number} */ now) => {
       const next = this.timeS + ((now - before) / 1000) * this.rate;
       before = now;
       if (next >= this.endS) this.pause();
       this.seek(next);
-      if (this.playing) requestAnimationFrame(frame);
+      if (this.playing) this.#frame = requestAnimationFrame(frame);
     };
-    requestAnimationFrame(frame);
+    this.#frame = requestAnimationFrame(frame);
     this.changed(this.timeS);
   }
 
-  pause() {
+  /** Ends it without a word. */
+  stop() {
     this.playing = false;
+    // A frame that is due would play on beside the next one.
+    cancelAnimationFrame(this.#frame);
+  }
+
+  pause() {
+    this.stop();
     this.changed(this.timeS);
   }
 
@@ -52,7 +70,10 @@ export class Clock {
     else this.play();
   }
 
-  /** The next slower or faster rate. */
+  /**
+   * The next slower or faster rate.
+   * @param {number} by
+   */
   faster(by) {
     const at = RATES.indexOf(this.rate) + by;
     this.rate = RATES[Math.min(Math.max(at, 0), RATES.length - 1)];

@@ -1,6 +1,11 @@
 // Data of the page: packed columns become arrays of numbers. `columns.rs` writes what is read here.
 
-/** Bytes of a base64 text. */
+/** @import { Header, Index } from "./data" */
+
+/**
+ * Bytes of a base64 text.
+ * @param {string} text
+ */
 function bytesOf(text) {
   const raw = atob(text);
   const bytes = new Uint8Array(raw.length);
@@ -8,13 +13,22 @@ function bytesOf(text) {
   return bytes;
 }
 
-/** A zlib stream, inflated by the browser. */
+/**
+ * A zlib stream, inflated by the browser.
+ * @param {Uint8Array<ArrayBuffer>} bytes
+ */
 async function inflated(bytes) {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** Reads `count` variable-length integers from a place on; gives them and the place after. */
+/**
+ * Reads `count` variable-length integers from a place on; gives them and the place after.
+ * @param {Uint8Array} bytes
+ * @param {number} from
+ * @param {number} count
+ * @returns {[Float64Array, number]}
+ */
 function integers(bytes, from, count) {
   const values = new Float64Array(count);
   let at = from;
@@ -33,7 +47,12 @@ function integers(bytes, from, count) {
   return [values, at];
 }
 
-/** Undoes the differences of a column, and gives its values in their unit. */
+/**
+ * Undoes the differences of a column, and gives its values in their unit.
+ * @param {Float64Array} values
+ * @param {number} order
+ * @param {number} step
+ */
 function restored(values, order, step) {
   for (let round = 0; round < order; round += 1) {
     let sum = 0;
@@ -47,14 +66,23 @@ function restored(values, order, step) {
   return step < 1 ? values.map((value) => value / parts) : values;
 }
 
-/** The header and the columns of an element's data. */
-export async function unpacked(id) {
-  const element = document.getElementById(id);
-  const bytes = await inflated(bytesOf(element.textContent.trim()));
+/**
+ * The header and the columns of an element's data.
+ * @param {string} id
+ */
+export const unpacked = (id) => unpackedText(document.getElementById(id).textContent.trim());
+
+/**
+ * The same of a text.
+ * @param {string} text
+ * @returns {Promise<{ header: Header, columns: Float64Array[] }>}
+ */
+export async function unpackedText(text) {
+  const bytes = await inflated(bytesOf(text));
   const length = new DataView(bytes.buffer).getUint32(0, true);
   const { columns: layouts, header } = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length)));
   let at = 4 + length;
-  const columns = layouts.map(([step, order, count]) => {
+  const columns = layouts.map((/** @type {[number, number, number]} */ [step, order, count]) => {
     const [values, next] = integers(bytes, at, count);
     at = next;
     return restored(values, order, step);
@@ -62,9 +90,13 @@ export async function unpacked(id) {
   return { header, columns };
 }
 
+/** @type {Index | null} */
 let known = null;
 
-/** What the page was made with: everything but what is packed. */
+/**
+ * What the page was made with: everything but what is packed.
+ * @returns {Index}
+ */
 export function index() {
   known ??= JSON.parse(document.getElementById("index").textContent);
   return known;

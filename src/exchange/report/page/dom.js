@@ -65,13 +65,15 @@ export function table(caption, heads, rows, attributes = {}) {
   );
 }
 
+let announced = 0;
+
 /** Says something to a screen reader, and shows it for a moment. */
 export function announce(text) {
   const place = document.getElementById("said");
   if (!place) return;
   place.textContent = text;
-  clearTimeout(announce.timer);
-  announce.timer = setTimeout(() => (place.textContent = ""), 2500);
+  clearTimeout(announced);
+  announced = window.setTimeout(() => (place.textContent = ""), 2500);
 }
 
 /** A colour or another value of the style sheet. */

@@ -88,7 +88,10 @@ function drawZebra(canvas, outline) {
       ];
   const length = Math.hypot(from[1].x - from[0].x, from[1].y - from[0].y);
   const stripes = Math.max(1, Math.round(length / 1.1));
-  const mix = ([p, q], share) => ({ x: p.x + (q.x - p.x) * share, y: p.y + (q.y - p.y) * share });
+  const mix = (/** @type {any[]} */ [p, q], /** @type {number} */ share) => ({
+    x: p.x + (q.x - p.x) * share,
+    y: p.y + (q.y - p.y) * share,
+  });
   for (let i = 0; i < stripes; i += 1) {
     const [low, high] = [i / stripes, (i + 0.5) / stripes];
     canvas.area([mix(from, low), mix(from, high), mix(to, high), mix(to, low)], canvas.colours.crosswalk);

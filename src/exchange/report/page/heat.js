@@ -54,11 +54,20 @@ function heatCell(tally) {
   const { endings, impact_mps: impact, reduction_mps: reduction, breached } = tally;
   const all = endings.reduce((sum, count) => sum + count, 0);
   // A breach without a contact is no clean drive.
-  const worst = Math.max(endings.findLastIndex((count) => count > 0), breached > 0 ? 2 : 0);
+  const worst = Math.max(
+    endings.findLastIndex((count) => count > 0),
+    breached > 0 ? 2 : 0,
+  );
   const told = HEAT_ENDINGS.map((ending, at) => endings[at] > 0 && `${endings[at]} ${ending}`).filter(Boolean);
   const speeds = impact === null ? null : `${figure(impact * 3.6, "km/h", 0)} (−${figure(reduction * 3.6, "", 0)})`;
   const title = [`${plural(all, "test")}: ${told.join(", ")}`, breached > 0 && `${breached} with a breach`];
-  const text = all === 1 ? HEAT_SIGNS[endings.findLastIndex((count) => count > 0)] : endings.map((count, at) => count > 0 && `${HEAT_SIGNS[at]} ${count}`).filter(Boolean).join(" ");
+  const text =
+    all === 1
+      ? HEAT_SIGNS[endings.findLastIndex((count) => count > 0)]
+      : endings
+          .map((count, at) => count > 0 && `${HEAT_SIGNS[at]} ${count}`)
+          .filter(Boolean)
+          .join(" ");
   return el(
     "td",
     { class: `heat-${worst}`, title: title.filter(Boolean).join("; ") },

@@ -19,7 +19,7 @@ const KEYS = [
 
 /** The keys, in a dialogue. */
 export function showKeys() {
-  let dialog = document.getElementById("help");
+  let dialog = /** @type {HTMLDialogElement} */ (document.getElementById("help"));
   if (!dialog) {
     dialog = el(
       "dialog",
@@ -61,7 +61,7 @@ export function key(event, watch) {
   }
   const layer = /^\d$/.test(event.key) ? LAYERS[(Number(event.key) + 9) % 10] : null;
   if (!layer) return false;
-  document.querySelector(`input[name="${layer[0]}"]`).click();
+  /** @type {HTMLInputElement} */ (document.querySelector(`input[name="${layer[0]}"]`)).click();
   return true;
 }
 

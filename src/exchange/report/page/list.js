@@ -16,7 +16,12 @@ import {
   recursInWords,
 } from "./words.js";
 
-/** What one can filter by: name in the link, heading, and the value of a scenario. */
+/** @import { Entry, Finding } from "./data" */
+
+/**
+ * What one can filter by: name in the link, heading, and the value of a scenario.
+ * @type {[string, string, (entry: Entry) => string][]}
+ */
 export const FILTERS = [
   ["road", "Road", (entry) => entry.summary.road],
   ["verdict", "Verdict", (entry) => mainCollision(entry.summary)?.class ?? "no collision"],
@@ -127,7 +132,10 @@ export function showList(place, data) {
 
 const REACHES = { avoidable: "avoidable", beyond_reference: "only without delay", unavoidable: "unavoidable" };
 
-/** Columns of the list: heading, what a scenario has there, and whether it is a number. */
+/**
+ * Columns of the list: heading, what a scenario has there, and whether it is a number.
+ * @type {[string, (entry: Entry, hit: Finding | null) => any, string?][]}
+ */
 const COLUMNS = [
   ["Counts", counts],
   ["Road", ({ summary }) => summary.road],
@@ -190,11 +198,12 @@ function listing(list) {
 
 /** How many there are of each kind, as bars that filter. */
 function barCharts(list) {
+  /** @type {[string, string, (entry: Entry) => string][]} */
   const charts = [
     ["Kinds of failure", "group", kindOf],
-    ...FILTERS.filter(([name]) => ["verdict", "recurs", "harm", "priority", "manoeuvre", "side", "cause", "change"].includes(name)).map(
-      ([name, title, value]) => [title, name, value],
-    ),
+    ...FILTERS.filter(([name]) =>
+      ["verdict", "recurs", "harm", "priority", "manoeuvre", "side", "cause", "change"].includes(name),
+    ).map(([name, title, value]) => /** @type {[string, string, (entry: Entry) => string]} */ ([title, name, value])),
   ];
   // Where no cause was looked for, or nothing compared, there is nothing to count.
   const nothing = { cause: causeInWords(null), change: "–" };

@@ -34,7 +34,7 @@ async function route() {
 }
 
 /** For the console of a browser, and for tests: what is open, with all its numbers. */
-window.avastra = { data, opened };
+/** @type {any} */ (window).avastra = { data, opened };
 
 function begin() {
   showTop(document.getElementById("top"), data);
@@ -56,7 +56,8 @@ function begin() {
   }
   window.addEventListener("hashchange", () => route().catch(failed));
   document.addEventListener("keydown", (event) => {
-    const isTyping = event.target.closest("input:not([type=range]):not([type=checkbox]), select, textarea, dialog");
+    const target = /** @type {HTMLElement} */ (event.target);
+    const isTyping = target.closest("input:not([type=range]):not([type=checkbox]), select, textarea, dialog");
     if (event.ctrlKey || event.metaKey || event.altKey || isTyping) return;
     if (event.key === "?") showKeys();
     else if (!opened() || isPress(event) || !key(event, opened())) return;
@@ -64,15 +65,12 @@ function begin() {
   });
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => opened()?.repaint());
   // Paper is light: canvases are painted anew in the colours that `print` has in the sheet.
-  for (const [name, isPrinted] of [
-    ["beforeprint", true],
-    ["afterprint", false],
-  ]) {
-    window.addEventListener(name, () => {
-      document.documentElement.classList.toggle("printed", isPrinted);
-      opened()?.repaint();
-    });
-  }
+  const paint = (/** @type {boolean} */ isPrinted) => () => {
+    document.documentElement.classList.toggle("printed", isPrinted);
+    opened()?.repaint();
+  };
+  window.addEventListener("beforeprint", paint(true));
+  window.addEventListener("afterprint", paint(false));
   route().catch(failed);
 }
 

@@ -1,9 +1,15 @@
 // A scenario as it was at any time: places between ticks, road users, what was believed and planned.
 import { index, unpacked } from "./decode.js";
 
+/** @import { Changes, Column, Ego, Header, Obstacle, Places, Quantisation, Way } from "./data" */
+
+/** @type {Map<string, Promise<Recording>>} */
 const recordings = new Map();
 
-/** The recording of an element, read once. */
+/**
+ * The recording of an element, read once.
+ * @param {string} id
+ */
 export function recording(id) {
   if (!recordings.has(id))
     recordings.set(
@@ -14,6 +20,10 @@ export function recording(id) {
 }
 
 export class Recording {
+  /**
+   * @param {{ header: Header, columns: Float64Array[] }} data
+   * @param {Quantisation} quantisation
+   */
   constructor({ header, columns }, { tick_s: tickS, perceived_s: lookS, thought_s: thoughtS }) {
     this.header = header;
     this.columns = columns;
@@ -23,17 +33,23 @@ export class Recording {
     this.looksPerThought = Math.round(thoughtS / lookS);
     this.ticks = columns[header.ego.speed_mps].length - 1;
     this.endS = this.ticks * this.tickS;
-    for (const track of header.tracks) track.offsets = this.#offsets(columns[track.counts]);
+    /** Where the points of each thought begin, of each track. */
+    this.trackOffsets = header.tracks.map((track) => this.#offsets(columns[track.counts]));
     this.planOffsets = this.#offsets(columns[header.plans.counts]);
   }
 
+  /** @param {Float64Array} counts */
   #offsets(counts) {
     const offsets = [0];
     for (const count of counts) offsets.push(offsets[offsets.length - 1] + count);
     return offsets;
   }
 
-  /** A column's value at a place between two of its values. */
+  /**
+   * A column's value at a place between two of its values.
+   * @param {Column} column
+   * @param {number} at
+   */
   between(column, at) {
     const values = this.columns[column];
     const low = Math.min(Math.max(Math.floor(at), 0), values.length - 1);
@@ -41,15 +57,21 @@ export class Recording {
     return values[low] + (values[high] - values[low]) * Math.min(Math.max(at - low, 0), 1);
   }
 
-  /** A pose from its three columns. */
+  /**
+   * A pose from its three columns.
+   * @param {Places} places
+   * @param {number} at
+   */
   pose([x, y, heading], at) {
     return { x: this.between(x, at), y: this.between(y, at), heading: this.between(heading, at) };
   }
 
+  /** @param {number} timeS */
   tickAt(timeS) {
     return Math.min(Math.max(timeS / this.tickS, 0), this.ticks);
   }
 
+  /** @param {number} timeS */
   ego(timeS) {
     const { ego } = this.header;
     const at = this.tickAt(timeS);
@@ -67,7 +89,10 @@ export class Recording {
     };
   }
 
-  /** The road users that are there, without the ego vehicle. */
+  /**
+   * The road users that are there, without the ego vehicle.
+   * @param {number} timeS
+   */
   obstacles(timeS) {
     const found = [];
     for (const one of this.header.obstacles) {
@@ -79,20 +104,39 @@ export class Recording {
       const speed = this.between(one.speed_mps, at);
       const braking = this.#brakes(one, timeS);
       const lights = this.latest(one.lights ?? [], this.tickAt(timeS))?.[1];
-      found.push({ id, body, like, verb, ambient, length, width, ...this.pose(one.places, at), speed, braking, lights });
+      found.push({
+        id,
+        body,
+        like,
+        verb,
+        ambient,
+        length,
+        width,
+        ...this.pose(one.places, at),
+        speed,
+        braking,
+        lights,
+      });
     }
     return found;
   }
 
+  /**
+   * @param {Ego | Obstacle} one
+   * @param {number} timeS
+   */
   #brakes({ brake_lights: lights }, timeS) {
     return this.latest(lights, this.tickAt(timeS))?.[1] ?? false;
   }
 
-  /** What the driving system believes to be there, as of its last look. */
+  /**
+   * What the driving system believes to be there, as of its last look.
+   * @param {number} timeS
+   */
   tracks(timeS) {
     const look = Math.floor(timeS / this.lookS + 1e-6);
     const found = [];
-    for (const track of this.header.tracks) {
+    for (const [number, track] of this.header.tracks.entries()) {
       const at = look - track.from_look;
       if (at < 0 || at >= this.columns[track.speed_mps].length) continue;
       const [x, y] = track.places.map((column) => this.columns[column][at]);
@@ -105,7 +149,7 @@ export class Recording {
         y,
         heading: this.columns[track.places[2]][at],
         speed: this.columns[track.speed_mps][at],
-        way: this.#points(track.predicted_m, track.offsets, thought).map((point) => ({
+        way: this.#points(track.predicted_m, this.trackOffsets[number], thought).map((point) => ({
           x: x + point.x,
           y: y + point.y,
         })),
@@ -114,11 +158,17 @@ export class Recording {
     return found;
   }
 
+  /** @param {number} timeS */
   plan(timeS) {
     const { x_m: x, y_m: y } = this.header.plans;
     return this.#points([x, y], this.planOffsets, Math.floor(timeS / this.thoughtS + 1e-6));
   }
 
+  /**
+   * @param {[Column, Column]} columns
+   * @param {number[]} offsets
+   * @param {number} number
+   */
   #points([x, y], offsets, number) {
     if (number < 0 || number + 1 >= offsets.length) return [];
     const points = [];
@@ -128,7 +178,11 @@ export class Recording {
     return points;
   }
 
-  /** Where a reference driver is; `null` before it takes over and after its end. */
+  /**
+   * Where a reference driver is; `null` before it takes over and after its end.
+   * @param {Way} way
+   * @param {number} timeS
+   */
   driver(way, timeS) {
     if (way.from_s === null || way.from_s === undefined) return null;
     const at = (timeS - way.from_s) / way.every_s;
@@ -138,13 +192,21 @@ export class Recording {
     return { ...this.pose(way.places, at), speed: this.between(way.speed_mps, at), length, width };
   }
 
-  /** All places of a reference driver. */
+  /**
+   * All places of a reference driver.
+   * @param {Way} way
+   */
   wayOf(way) {
     const [x, y] = way.places.map((column) => this.columns[column]);
     return Array.from(x, (value, i) => ({ x: value, y: y[i] }));
   }
 
-  /** The latest entry of a list of `[from, …]` at a time or tick. */
+  /**
+   * The latest entry of a list of `[from, …]` at a time or tick.
+   * @template T
+   * @param {Changes<T>} list
+   * @param {number} at
+   */
   latest(list, at) {
     let found = null;
     for (const entry of list) {
@@ -154,20 +216,29 @@ export class Recording {
     return found;
   }
 
+  /** @param {number} timeS */
   held(timeS) {
     // At a tick, what is said at its beginning drives to the next one.
     return this.latest(this.header.held, timeS)?.[1] ?? "";
   }
 
+  /** @param {number} timeS */
   sky(timeS) {
     return this.latest(this.header.skies, timeS)?.[1] ?? "";
   }
 
+  /**
+   * @param {number} number
+   * @param {number} timeS
+   */
   signal(number, timeS) {
     return this.latest(this.header.signals[number] ?? [], this.tickAt(timeS))?.[1] ?? null;
   }
 
-  /** Number of the step at a time. */
+  /**
+   * Number of the step at a time.
+   * @param {number} timeS
+   */
   step(timeS) {
     const { steps } = this.header;
     let found = 0;
@@ -175,7 +246,10 @@ export class Recording {
     return found;
   }
 
-  /** Where the ego vehicle and another met. */
+  /**
+   * Where the ego vehicle and another met.
+   * @param {{ x_m: number, y_m: number }} collision
+   */
   impact({ x_m: x, y_m: y }) {
     return { x, y };
   }

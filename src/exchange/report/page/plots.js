@@ -120,7 +120,7 @@ export class Plots {
     return undefined;
   }
 
-  #curve(values, factor, [low, high], top, height, colour, dash) {
+  #curve(values, factor, /** @type {number[]} */ [low, high], top, height, colour, dash) {
     const { context, colours } = this.canvas;
     const y = (value) => top + height - ((value - low) / (high - low || 1)) * height;
     context.strokeStyle = colours.grid;
@@ -149,7 +149,10 @@ export class Plots {
     const { context, colours } = this.canvas;
     const { header, columns, tickS } = this.recording;
     const all = parts.flatMap(([, column]) => Array.from(columns[column]));
-    const [low, high] = [all.reduce((least, m) => Math.min(least, Math.max(m, -100)), 0), Math.max(0.1, median(all) * 2)];
+    const [low, high] = [
+      all.reduce((least, m) => Math.min(least, Math.max(m, -100)), 0),
+      Math.max(0.1, median(all) * 2),
+    ];
     const y = (margin) => top + height - ((Math.min(Math.max(margin, low), high) - low) / (high - low)) * height;
     context.fillStyle = `color-mix(in srgb, ${colours.danger} 25%, ${colours.paper})`;
     for (const breach of header.summary.breaches.filter((one) => one.requirement === requirement)) {

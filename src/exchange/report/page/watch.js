@@ -12,6 +12,10 @@ import { drawStrip } from "./strip.js";
 import { LAYERS_AT_FIRST, View } from "./view.js";
 import { atTime, breachInWords, changeInWords, collisionInWords, driverInWords, mainCollision } from "./words.js";
 
+/** @import { Entry, Index } from "./data" */
+/** @import { Recording } from "./moment.js" */
+
+/** @type {Watch | null} */
 let open = null;
 /** How often something was asked for: of two quick clicks the later one counts. */
 let asked = 0;
@@ -55,8 +59,18 @@ async function other(data, entry, wanted) {
 }
 
 class Watch {
+  /**
+   * @param {HTMLElement} place
+   * @param {Index} data
+   * @param {Entry} entry
+   * @param {{ first: Recording, road: any, second: { recording: Recording, road: any, name: string } | null }} shown
+   */
   constructor(place, data, entry, { first, road, second }) {
-    Object.assign(this, { data, entry, recording: first, road, second });
+    this.data = data;
+    this.entry = entry;
+    this.recording = first;
+    this.road = road;
+    this.second = second;
     this.layers = new Set((linked().layers ?? LAYERS_AT_FIRST).split(",").filter(Boolean));
     const endS = Math.max(first.endS, second?.recording.endS ?? 0);
     this.clock = new Clock(endS, first.tickS, () => this.#show());
@@ -74,7 +88,7 @@ class Watch {
   }
 
   end() {
-    this.clock.playing = false;
+    this.clock.stop();
     this.resize?.disconnect();
   }
 
@@ -169,7 +183,7 @@ class Watch {
   }
 
   #watchDrivers(timeS) {
-    const box = document.querySelector('input[name="drivers"]');
+    const box = /** @type {HTMLInputElement} */ (document.querySelector('input[name="drivers"]'));
     if (!box.checked) box.click();
     this.clock.seek(timeS);
     this.clock.play();

@@ -1,5 +1,7 @@
 // What the engine's short words mean, and figures as people read them.
 
+/** @import { Breach, Finding, Recurrence, Summary } from "./data" */
+
 export const VERDICTS = {
   avoidable: "a careful driver would have avoided it",
   beyond_reference: "only a driver without any delay would have avoided it",
@@ -55,18 +57,27 @@ export function plural(count, noun) {
   return `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
 }
 
-/** The collision that a scenario is about: the first that counts, or the first. */
+/**
+ * The collision that a scenario is about: the first that counts, or the first.
+ * @param {Summary} summary
+ */
 export function mainCollision(summary) {
   return summary.collisions.find((collision) => collision.counted) ?? summary.collisions[0] ?? null;
 }
 
-/** What a scenario is about: its main collision, or else its first breach. */
+/**
+ * What a scenario is about: its main collision, or else its first breach.
+ * @param {Summary} summary
+ */
 export const mainFinding = (summary) => {
   const collision = mainCollision(summary);
   return collision?.counted ? collision : (summary.breaches[0] ?? collision);
 };
 
-/** Whether a finding is more than one draw of the noise. */
+/**
+ * Whether a finding is more than one draw of the noise.
+ * @param {{ recurrence: Recurrence | null } | null} finding
+ */
 export function recursInWords(finding) {
   const recurrence = finding?.recurrence;
   if (!recurrence) return "not tried";
@@ -80,7 +91,11 @@ export const HARMS = {
   serious: "at least one person in ten is seriously injured at such a speed",
 };
 
-/** A collision in a sentence. */
+/**
+ * A collision in a sentence.
+ * @param {Finding} collision
+ * @param {string} [road]
+ */
 export function collisionInWords(collision, road) {
   const others = { standing: "standing", along: "moving along", oncoming: "oncoming" };
   const how = others[collision.approach] ?? `coming ${collision.approach}`;
@@ -91,7 +106,10 @@ export function collisionInWords(collision, road) {
   );
 }
 
-/** A breach of a requirement in a sentence. */
+/**
+ * A breach of a requirement in a sentence.
+ * @param {Breach} breach
+ */
 export function breachInWords({ requirement, obstacle, at_s: atS, margin, unit }) {
   const of = obstacle === null ? "" : ` of #${obstacle}`;
   const by = margin === null ? "" : `, by ${figure(Math.abs(margin), unit ?? "", 2).trim()} at most`;
@@ -114,7 +132,10 @@ export const CHANGES = {
 /** What ProC means, for those who do not know the word. */
 export const PROC = "collision probability: how near the ego vehicle is to a crash, from 0 to 1";
 
-/** The result of a comparison, with how far the time of the crash has moved. */
+/**
+ * The result of a comparison, with how far the time of the crash has moved.
+ * @param {{ kind: string, later_s?: number }} change
+ */
 export function changeInWords({ kind, later_s: laterS }) {
   if (kind !== "other_time") return CHANGES[kind] ?? kind;
   return `same crash, ${figure(Math.abs(laterS), "s", 2)} ${laterS > 0 ? "later" : "earlier"}`;

@@ -1,0 +1,217 @@
+// What the page reads: written by `report/recording.rs`, `report/mind.rs` and `report/page.rs`, held against them by
+// `tests/it/report.rs`. A `Column` is the number of a column of values, packed by `report/columns.rs`.
+
+export type Column = number;
+/** Columns of x (m), y (m) and heading (rad). */
+export type Places = [Column, Column, Column];
+/** From a tick or a time (s) on: what. */
+export type Changes<T> = [number, T][];
+
+export interface Header {
+  summary: Summary;
+  origin: [string, string][];
+  source: string;
+  rows: string[];
+  step_s: number;
+  collisions: Collision[];
+  steps: Step[];
+  held: Changes<string>;
+  ego: Ego;
+  obstacles: Obstacle[];
+  tracks: Track[];
+  plans: Plans;
+  margins: Margin[];
+  signals: Record<number, Changes<string>>;
+  skies: Changes<string>;
+}
+
+export interface Summary {
+  name: string;
+  road: string;
+  ads: string;
+  duration_s: number;
+  end: string;
+  steps: number;
+  actions: number;
+  collisions: Finding[];
+  refuted: { claim: string; confirmed: boolean | null; found: string }[];
+  same: boolean | null;
+  breaches: Breach[];
+}
+
+/** How often a finding recurs under other noise. */
+export interface Recurrence {
+  recurred: number;
+  replays: number;
+  text: string;
+  fluke: boolean;
+}
+
+/** A collision of the list. */
+export interface Finding {
+  at_s: number;
+  obstacle: number;
+  body: string;
+  kind: string;
+  shape: string;
+  precrash: string;
+  precrash_number: number;
+  verb: string;
+  x_m: number;
+  y_m: number;
+  counted: boolean;
+  class: string;
+  onset_s: number | null;
+  avoided_by: string[];
+  letter: string | null;
+  evasion: string | null;
+  priority: string;
+  side: string;
+  approach: string;
+  ego_mps: number;
+  closing_mps: number;
+  delta_v_mps: number;
+  other_delta_v_mps: number;
+  harm: string;
+  harm_share: number;
+  recurrence: Recurrence | null;
+  sudden: boolean;
+  struck: boolean;
+  cause: string[] | null;
+  held: string | null;
+}
+
+/** A collision with the drives of careful drivers. */
+export interface Collision extends Finding {
+  ways: Way[];
+}
+
+/** The drive of a careful driver from the onset of a collision; `from_s` is null where it never took over. */
+export interface Way {
+  name: string;
+  avoids: boolean;
+  from_s: number | null;
+  every_s: number;
+  places: Places;
+  speed_mps: Column;
+}
+
+export interface Breach {
+  requirement: string;
+  obstacle: number | null;
+  docs: string;
+  at_s: number;
+  until_s: number | null;
+  margin: number | null;
+  unit: string | null;
+  kept_by: string[] | null;
+  recurrence: Recurrence | null;
+}
+
+export interface Step {
+  at_s: number;
+  outcome: Outcome;
+  proc: number;
+  reward: number;
+  offers: { legal: number[]; masked: [string, number[]][] } | null;
+}
+
+export type Outcome =
+  | { kind: "done"; row: number; text: string; made: number[]; at_s: number }
+  | { kind: "passed" }
+  | { kind: "refused"; row: number; rule: string | null; reason: string };
+
+export interface Ego {
+  places: Places;
+  speed_mps: Column;
+  acceleration_mps2: Column;
+  steer_rad: Column;
+  throttle_pct: Column;
+  brake_pct: Column;
+  proc: Column;
+  brake_lights: Changes<boolean>;
+  length_m: number;
+  width_m: number;
+}
+
+export interface Obstacle {
+  id: number;
+  body: string;
+  like: string;
+  colour: string;
+  verb: string;
+  ambient: boolean;
+  from_tick: number;
+  length_m: number;
+  width_m: number;
+  places: Places;
+  speed_mps: Column;
+  brake_lights: Changes<boolean>;
+  lights?: Changes<string>;
+  phases?: Changes<string>;
+}
+
+/** What the driving system believed to be there; `track` is null for a ghost. `counts` and `predicted_m` are of each thought. */
+export interface Track {
+  track: number | null;
+  of: number | null;
+  from_look: number;
+  body: string;
+  length_m: number;
+  width_m: number;
+  places: Places;
+  speed_mps: Column;
+  counts: Column;
+  predicted_m: [Column, Column];
+}
+
+export interface Plans {
+  counts: Column;
+  x_m: Column;
+  y_m: Column;
+}
+
+/** A requirement's margin, in stretches of ticks in which it was asked. */
+export interface Margin {
+  requirement: string;
+  unit: string | null;
+  parts: [number, Column][];
+}
+
+/** Half of each column's step, and the times between ticks, looks and thoughts. */
+export interface Quantisation {
+  place_m: number;
+  heading_rad: number;
+  speed_mps: number;
+  acceleration_mps2: number;
+  probability: number;
+  sketch_m: number;
+  tick_s: number;
+  perceived_s: number;
+  thought_s: number;
+}
+
+/** All that is not packed. */
+export interface Index {
+  schema: 1;
+  title: string;
+  avastra: string;
+  engine: string;
+  quantisation: Quantisation;
+  overview: any;
+  remarks: string[];
+  compared_with: string | null;
+  scenarios: Entry[];
+}
+
+/** A scenario of the list: `n` names its packed data, `ground` that of its road. */
+export interface Entry {
+  n: number;
+  file: string;
+  ground: string;
+  summary: Summary;
+  shrunk_from: string | null;
+  compared: boolean;
+  change: { kind: string; later_s?: number; why?: string | null } | null;
+  changed: string | null;
+}

@@ -1,0 +1,199 @@
+// The page's modules without a browser: `node --test tests/page`. `tests/interop/report.sh` opens whole pages in one.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { deflateSync } from "node:zlib";
+
+import { Clock, RATES } from "../../src/exchange/report/page/clock.js";
+import { unpackedText } from "../../src/exchange/report/page/decode.js";
+import { byName, linkOf, linkToList, linked, relink } from "../../src/exchange/report/page/link.js";
+import { Recording } from "../../src/exchange/report/page/moment.js";
+import { mainCollision, mainFinding, recursInWords } from "../../src/exchange/report/page/words.js";
+
+/** Frames as a browser hands them out, at times that the test says. */
+function browser() {
+  const due = new Map();
+  let [last, nowMs] = [0, 0];
+  globalThis.requestAnimationFrame = (frame) => {
+    last += 1;
+    due.set(last, frame);
+    return last;
+  };
+  globalThis.cancelAnimationFrame = (number) => due.delete(number);
+  globalThis.performance.now = () => nowMs;
+  const pass = (ms) => {
+    nowMs += ms;
+    const frames = [...due.values()];
+    due.clear();
+    frames.forEach((frame) => frame(nowMs));
+  };
+  return { due, pass };
+}
+
+test("a clock plays at its rate and stops at the end", () => {
+  const { due, pass } = browser();
+  const seen = [];
+  const clock = new Clock(2, 0.02, (timeS) => seen.push(timeS));
+  clock.play();
+  pass(500);
+  assert.equal(clock.timeS, 0.5);
+  clock.faster(1);
+  assert.equal(clock.rate, 2);
+  pass(500);
+  assert.equal(clock.timeS, 1.5);
+  pass(500);
+  assert.deepEqual([clock.timeS, clock.playing, due.size], [2, false, 0]);
+  assert.equal(seen.at(-1), 2);
+  clock.play();
+  assert.equal(clock.timeS, 0, "from the end it begins anew");
+});
+
+test("a clock that is stopped and started within a frame plays once", () => {
+  const { due, pass } = browser();
+  const clock = new Clock(10, 0.02, () => {});
+  clock.play();
+  clock.pause();
+  clock.play();
+  assert.equal(due.size, 1);
+  pass(1000);
+  assert.equal(clock.timeS, 1);
+});
+
+test("ticks are whole, and rates have ends", () => {
+  browser();
+  const clock = new Clock(10, 0.02, () => {});
+  clock.seek(1.013);
+  clock.ticks(1);
+  assert.ok(Math.abs(clock.timeS - 1.02) < 1e-9);
+  clock.ticks(-1);
+  assert.ok(Math.abs(clock.timeS - 1) < 1e-9);
+  clock.seek(-3);
+  assert.equal(clock.timeS, 0);
+  clock.seek(30);
+  assert.equal(clock.timeS, 10);
+  RATES.forEach(() => clock.faster(1));
+  assert.equal(clock.rate, RATES.at(-1));
+  RATES.forEach(() => clock.faster(-1));
+  assert.equal(clock.rate, RATES[0]);
+});
+
+/** Packs whole numbers as `report/columns.rs` does, but written anew. */
+function packed(header, columns) {
+  const bytes = [];
+  const layouts = columns.map(({ step, order, values }) => {
+    let whole = values;
+    for (let round = 0; round < order; round += 1) whole = whole.map((value, i) => value - (i ? whole[i - 1] : 0));
+    for (const value of whole) {
+      let zigzag = value < 0 ? -2 * value - 1 : 2 * value;
+      for (; zigzag >= 128; zigzag = Math.floor(zigzag / 128)) bytes.push((zigzag % 128) + 128);
+      bytes.push(zigzag);
+    }
+    return [step, order, values.length];
+  });
+  const text = Buffer.from(JSON.stringify({ columns: layouts, header }));
+  const length = Buffer.alloc(4);
+  length.writeUInt32LE(text.length);
+  return deflateSync(Buffer.concat([length, text, Buffer.from(bytes)])).toString("base64");
+}
+
+test("packed columns come back, of any order, sign and size", async () => {
+  const values = [0, -1, 63, 64, -64, -65, 8191, 2 ** 40, -(2 ** 40), 7];
+  const columns = [0, 1, 2].map((order) => ({ step: 1, order, values }));
+  columns.push({ step: 0.01, order: 1, values: [100, 129, 57] }, { step: 1, order: 0, values: [] });
+  const found = await unpackedText(packed({ any: "Überholer" }, columns));
+  assert.equal(found.header.any, "Überholer");
+  for (const column of found.columns.slice(0, 3)) assert.deepEqual([...column], values);
+  assert.deepEqual([...found.columns[3]], [1, 1.29, 0.57]);
+  assert.equal(found.columns[4].length, 0);
+});
+
+/** Three ticks of an ego vehicle that gains 1 m a tick; another one is there from tick 1 on. */
+function recording() {
+  const columns = [[0, 1, 2], [0, 0, 0], [0, 0.2, 0.4], [50, 50, 50], [5, 7], [0, 0], [1, 0], [4, 6], [0, 2]];
+  const ego = { places: [0, 1, 2], brake_lights: [[1, true], [2, false]], length_m: 4.7, width_m: 1.9 };
+  for (const name of ["speed_mps", "acceleration_mps2", "steer_rad", "throttle_pct", "brake_pct", "proc"]) ego[name] = 3;
+  const other = { id: 1, from_tick: 1, places: [4, 5, 5], speed_mps: 4, brake_lights: [], lights: [[2, "Hazard"]] };
+  const way = { from_s: 0.02, every_s: 0.02, places: [4, 5, 5], speed_mps: 4 };
+  const header = {
+    ego, obstacles: [other], tracks: [], plans: { counts: 6, x_m: 7, y_m: 8 }, steps: [{ at_s: 0 }, { at_s: 0.04 }],
+    held: [[0, "limit"], [0.03, "leader"]], skies: [], signals: { 3: [[0, "red"], [2, "green"]] },
+    collisions: [{ at_s: 0.02, counted: false }, { at_s: 0.04, counted: true }],
+  };
+  const quantisation = { tick_s: 0.02, perceived_s: 0.1, thought_s: 0.1 };
+  return { recording: new Recording({ header, columns: columns.map((of) => Float64Array.from(of)) }, quantisation), way };
+}
+
+test("a moment is between its ticks", () => {
+  const { recording: of } = recording();
+  assert.equal(of.endS, 0.04);
+  assert.equal(of.ego(0.03).x, 1.5);
+  assert.ok(Math.abs(of.ego(0.01).heading - 0.1) < 1e-9);
+  assert.deepEqual([0, 0.02, 0.03, 0.04].map((timeS) => of.ego(timeS).braking), [false, true, true, false]);
+  assert.equal(of.ego(99).x, 2, "after the end it is where it was");
+});
+
+test("others are there from their first tick on, with the lights of the moment", () => {
+  const { recording: of } = recording();
+  assert.deepEqual(of.obstacles(0.01), []);
+  assert.deepEqual(of.obstacles(0.03).map(({ x, lights }) => [x, lights]), [[6, undefined]]);
+  assert.equal(of.obstacles(0.04)[0].lights, "Hazard");
+});
+
+test("what was said last holds, and steps and lights are those of the moment", () => {
+  const { recording: of } = recording();
+  assert.deepEqual([of.held(0.01), of.held(0.03), of.sky(0.01)], ["limit", "leader", ""]);
+  assert.deepEqual([of.step(0.03), of.step(0.04)], [0, 1]);
+  assert.deepEqual([of.signal(3, 0.02), of.signal(3, 0.04), of.signal(9, 0)], ["red", "green", null]);
+});
+
+test("a careful driver is there once it takes over, until its end", () => {
+  const { recording: of, way } = recording();
+  assert.equal(of.driver({ ...way, from_s: null }, 0.03), null);
+  assert.equal(of.driver(way, 0.01), null);
+  assert.equal(of.driver(way, 0.03).x, 6);
+  assert.equal(of.driver(way, 0.05), null);
+  assert.deepEqual(of.wayOf(way), [{ x: 5, y: 0 }, { x: 7, y: 0 }]);
+});
+
+test("a plan has the points of its thought", () => {
+  const { recording: of } = recording();
+  assert.deepEqual(of.plan(0.05), [{ x: 4, y: 0 }]);
+  assert.deepEqual(of.plan(0.1), []);
+  assert.deepEqual(of.plan(9), [], "after the last thought there is none");
+});
+
+test("a scenario is about the first collision that counts, or its first breach", () => {
+  const { recording: of } = recording();
+  assert.equal(of.collision().at_s, 0.04);
+  const [touched, counted] = of.header.collisions;
+  const breach = { requirement: "gap", recurrence: { fluke: true } };
+  assert.equal(mainCollision({ collisions: [touched, counted], breaches: [] }), counted);
+  assert.equal(mainFinding({ collisions: [touched], breaches: [breach] }), breach);
+  assert.equal(mainFinding({ collisions: [touched], breaches: [] }), touched);
+  assert.deepEqual([recursInWords(breach), recursInWords(touched), recursInWords(null)], ["fluke", "not tried", "not tried"]);
+});
+
+/** A browser's address. */
+function at(hash) {
+  globalThis.location = { hash };
+  globalThis.history = { replaceState: (state, title, url) => (globalThis.location.hash = url === "#" ? "" : url) };
+}
+
+test("a link is the state, and changing it keeps the rest", () => {
+  at("#s=critical/a,b&t=3.5&road=corner");
+  assert.deepEqual(linked(), { s: "critical/a,b", t: "3.5", road: "corner" });
+  relink({ t: "4" });
+  assert.equal(location.hash, "#s=critical/a,b&t=4&road=corner");
+  assert.equal(linkToList(), "#road=corner");
+  relink({ s: null, t: null, road: "" });
+  assert.equal(location.hash, "");
+  assert.equal(linkOf({ q: "a b&c" }), "#q=a+b%26c");
+});
+
+test("a scenario is found by its file, or by the end of it", () => {
+  const scenarios = [{ file: "critical/one.ava" }, { file: "shrunk/two.ava" }, { file: "two.ava" }];
+  assert.equal(byName(scenarios, "critical/one"), scenarios[0]);
+  assert.equal(byName(scenarios, "one"), scenarios[0]);
+  assert.equal(byName(scenarios, "two"), scenarios[2], "the whole name first");
+  assert.equal(byName(scenarios, "three"), null);
+  assert.equal(byName(scenarios, ""), null);
+});
