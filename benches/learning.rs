@@ -50,13 +50,13 @@ fn measured(text: &str) -> (f64, f64) {
     let mut rng = rng::stream(1, Stream::Traffic, 0);
     // Fills the replay memory and warms up the caches.
     (0..20).for_each(|_| {
-        black_box(learner.learn(&episode(&mut rng, 100), &mut rng.clone()).loss);
+        black_box(learner.learn(&episode(&mut rng, 100), &mut rng.clone()).expect("it learns").loss);
     });
     let seconds: Vec<f64> = (0..REPEATS)
         .map(|_| {
             let episode = episode(&mut rng, STEPS);
             let begin = cpu_s();
-            black_box(learner.learn(&episode, &mut rng));
+            black_box(learner.learn(&episode, &mut rng).expect("it learns"));
             cpu_s() - begin
         })
         .collect();

@@ -155,6 +155,9 @@ fn play_all(
             directory.write(|database| database.add(&cells))?;
             times.write(&path)
         }
+        Event::Diverged { agent, number, why } => {
+            Err(Failure::file("go on with", &path, format!("agent `{agent}`, training {number}: {why}")))
+        }
     })?;
     drop(progress);
     let is_over = share.lacking(study.settings(), &directory)?.is_empty();

@@ -69,7 +69,7 @@ pub fn train(output: &Output, arguments: &TrainArguments) -> Result<(), Failure>
     let stop = stop_on_interrupt();
     let mut progress = TrainingProgress::new(output, settings.episodes as u64, training.episodes() as u64);
     while !training.is_done() && !stop.load(Ordering::Relaxed) {
-        let trained = training.episode();
+        let trained = training.episode().map_err(|why| Failure::file("go on with", &directory.path, why))?;
         // No driving system is left to drive the other episodes. This one is kept with a checkpoint.
         if training.arena().program().is_some_and(|program| program.given_up().is_some()) {
             stop.store(true, Ordering::Relaxed);

@@ -70,12 +70,13 @@ fn what_is_trained_goes_on_from_a_checkpoint_to_the_same_episodes() {
     for entry in agent::REGISTRY {
         let Some(mut whole) = training(entry, None) else { continue };
         for _ in 0..14 {
-            whole.episode();
+            whole.episode().expect("it learns");
         }
         let checkpoint = whole.agent().save();
         let mut resumed = training(entry, Some((14, &checkpoint))).expect("it is trained");
         while !whole.is_done() {
-            let (one, other): (TrainedEpisode, TrainedEpisode) = (whole.episode(), resumed.episode());
+            let (one, other): (TrainedEpisode, TrainedEpisode) =
+                (whole.episode().expect("it learns"), resumed.episode().expect("it learns"));
             let name = entry.name;
             assert_eq!(one.log, other.log, "{name}");
             assert_eq!((one.sum, one.simulated_s), (other.sum, other.simulated_s), "{name}");

@@ -232,3 +232,17 @@ fn what_cannot_be_trained_is_said_so() {
         fails(arguments, reason);
     }
 }
+
+/// What was learned up to then is kept, and no number that is none is written.
+#[test]
+fn a_training_that_diverges_is_said_so() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let config = scratch.path().join("config.yaml");
+    let settings = "learning_starts: 30\nupdates_per_step: 4\nbatch_len: 8\nlearning_rate: 1000000\n";
+    std::fs::write(&config, settings).expect("it is writable");
+    let (config, out) = (config.display().to_string(), scratch.path().join("out").display().to_string());
+    let train = ["train", "scenarios/avastra45.ava", "--road", "corner", "--episodes", "30", "--seed", "5"];
+    let reason = "the network diverged in update 2: lower `learning_rate`";
+    fails(&[&train[..], &["--config", &config, "--out", &out]].concat(), reason);
+    fails(&["train", "--resume", &out], reason);
+}

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use crate::run::on_threads;
 use crate::train::Training;
-use avastra_search::agent::Agent;
+use avastra_search::agent::{Agent, Diverged};
 
 use crate::study::ready::Study;
 use crate::study::record::{CellRecord, EpisodeRecord, Spent, TrainedRecord};
@@ -27,6 +27,8 @@ pub enum Event {
     Episode { counted: usize },
     /// A job is done: a cell for each of its roads.
     Done(Vec<CellRecord>),
+    /// The training of an agent, by its number, cannot go on.
+    Diverged { agent: String, number: u32, why: Diverged },
 }
 
 /// Plays jobs on several threads, and calls `on` on this thread with what happens. Stops early when `stop` is set or
@@ -42,11 +44,17 @@ pub fn play_jobs<E>(
     clock: &(dyn Fn() -> Spent + Sync),
     on: &mut dyn FnMut(Event) -> Result<(), E>,
 ) -> Result<(), E> {
-    let work = |job: &Job, tell: &mut dyn FnMut(Event) -> bool| {
-        if let Some(cells) = play(study, job, clock, &mut |counted| tell(Event::Episode { counted })) {
-            tell(Event::Done(cells));
-        }
-    };
+    let work =
+        |job: &Job, tell: &mut dyn FnMut(Event) -> bool| match play(study, job, clock, &mut |counted| {
+            tell(Event::Episode { counted })
+        }) {
+            Ok(Some(cells)) => drop(tell(Event::Done(cells))),
+            Ok(None) => {}
+            Err(why) => {
+                let agent = study.agent(job).label.clone();
+                tell(Event::Diverged { agent, number: job.number, why });
+            }
+        };
     on_threads(jobs, threads, stop, work, on)
 }
 
@@ -59,12 +67,15 @@ fn actor(training: &Training, settings: &AgentSettings) -> Box<dyn Agent> {
 
 /// Plays one job. `tell` gets the counted collisions of every episode and says whether to go on; if not, the
 /// result is `None`.
+///
+/// # Errors
+/// If the training cannot go on.
 fn play(
     study: &Study,
     job: &Job,
     clock: &dyn Fn() -> Spent,
     tell: &mut dyn FnMut(usize) -> bool,
-) -> Option<Vec<CellRecord>> {
+) -> Result<Option<Vec<CellRecord>>, Diverged> {
     let mut begun = clock();
     let agent = study.agent(job);
     let mut trained = Vec::new();
@@ -74,10 +85,10 @@ fn play(
         .then(|| study.training(job).expect("the study was checked when it was made"));
     if let Some(training) = &mut training {
         while !training.is_done() {
-            let episode = training.episode();
+            let episode = training.episode()?;
             trained.push(TrainedRecord::new(&episode));
             if !tell(episode.summary.counted()) {
-                return None;
+                return Ok(None);
             }
         }
     }
@@ -94,7 +105,7 @@ fn play(
                 };
                 episodes.push(EpisodeRecord::new(run.settings().seed, &summary, &log));
                 if !tell(summary.counted()) {
-                    return None;
+                    return Ok(None);
                 }
             }
         }
@@ -114,5 +125,5 @@ fn play(
             spent: Some(spent),
         });
     }
-    Some(cells)
+    Ok(Some(cells))
 }

@@ -19,7 +19,9 @@ use avastra_drivers::Ads;
 use avastra_drivers::external::Attached;
 use avastra_lang::model::Space;
 use avastra_lang::model::vocabulary::Word;
-use avastra_search::agent::{Collided, Experience, Kind, Lesson, Rows, Settings, Trainable, Trajectory};
+use avastra_search::agent::{
+    Collided, Diverged, Experience, Kind, Lesson, Rows, Settings, Trainable, Trajectory,
+};
 use avastra_search::mdp;
 use avastra_search::mdp::{Closeness, Observation, ProcKind, StepOutcome};
 use avastra_world::action::ActionTable;
@@ -166,7 +168,10 @@ impl Training {
     }
 
     /// Plays the next episode and learns from it.
-    pub fn episode(&mut self) -> TrainedEpisode {
+    ///
+    /// # Errors
+    /// If nothing can be learned any more.
+    pub fn episode(&mut self) -> Result<TrainedEpisode, Diverged> {
         let number = self.next;
         let road = number % self.arena.roads();
         let fresh = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
@@ -194,9 +199,9 @@ impl Training {
             collisions: summary.collisions.iter().map(collided).collect(),
         };
         let mut rng = rng::stream(self.settings.seed, Stream::Replay, number as u64);
-        let lesson = self.agent.learn(&trajectory, &mut rng);
+        let lesson = self.agent.learn(&trajectory, &mut rng)?;
         self.next += 1;
-        TrainedEpisode {
+        Ok(TrainedEpisode {
             sum: trajectory.sum(),
             exploration_epsilon,
             lesson,
@@ -204,7 +209,7 @@ impl Training {
             simulated_s: log.duration_s + summary.branched_s,
             log,
             summary,
-        }
+        })
     }
 
     /// The log of an episode with the collision probabilities that the space defines, where the agent learns with

@@ -161,7 +161,7 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
         match &effect.kind {
             ast::EffectKind::Set { state, key, value } => {
                 names.push(state);
-                exprs.extend(key.iter().chain([value]));
+                exprs.extend(key.as_deref().into_iter().chain([&**value]));
             }
             ast::EffectKind::Order { who, fields: of_order } => {
                 names.push(who);

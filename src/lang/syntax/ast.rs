@@ -343,8 +343,8 @@ pub enum EffectKind {
     /// `set sky = None`, `set sky[what] = how`.
     Set {
         state: Name,
-        key: Option<Expr>,
-        value: Expr,
+        key: Option<Box<Expr>>,
+        value: Box<Expr>,
     },
     Spawn(Box<Spawn>),
     /// `order truck { speed: 0 m/s }`.

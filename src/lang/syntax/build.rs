@@ -317,7 +317,7 @@ impl Builder {
         } else if rule == Rule::set {
             let state = self.name(parts.next());
             let key = parts.take(Rule::key).map(|key| self.only_expression(key)).transpose()?;
-            EffectKind::Set { state, key, value: self.expression(parts.next())? }
+            EffectKind::Set { state, key: key.map(Box::new), value: Box::new(self.expression(parts.next())?) }
         } else {
             let body = self.expression(parts.next())?;
             let bearers = parts.take(Rule::bearer).map_or_else(Vec::new, |bearer| {

@@ -163,4 +163,26 @@ mod tests {
         let ours: BTreeSet<&str> = keywords().map(|(word, _)| *word).collect();
         assert_eq!(ours, grammar_words());
     }
+
+    /// The words in a rule of the grammar.
+    fn words_of(rule: &str) -> BTreeSet<&'static str> {
+        let grammar = include_str!("../../../grammar/ava.pest");
+        let body = grammar.split(&format!("\n{rule} = @{{")).nth(1).and_then(|rest| rest.split("\n}").next());
+        let quoted = body.unwrap_or_else(|| panic!("no rule {rule}")).split('"').skip(1).step_by(2);
+        quoted.filter(|word| word.starts_with(|c: char| c.is_ascii_alphabetic())).collect()
+    }
+
+    /// Where one declaration ends and the next begins is told by lists of their own.
+    #[test]
+    fn the_lists_of_the_grammar_hold_every_declaration() {
+        let declarations: BTreeSet<&str> = DECLARATIONS.iter().map(|(word, _)| *word).collect();
+        // `on … also` and `each step` begin one, too.
+        let begins = words_of("declaration_keyword");
+        assert_eq!(begins, declarations.union(&BTreeSet::from(["on", "each", "step"])).copied().collect());
+        let (no_name, no_unit) = (words_of("declaring_word"), words_of("unit_stop"));
+        assert!(no_name.is_subset(&declarations), "{no_name:?}");
+        assert!(no_unit.iter().all(|word| meaning(word).is_some()), "{no_unit:?}");
+        let stops: BTreeSet<&str> = no_name.union(&no_unit).copied().collect();
+        assert!(declarations.is_subset(&stops), "{:?}", declarations.difference(&stops));
+    }
 }

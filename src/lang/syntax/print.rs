@@ -439,7 +439,7 @@ impl Printer<'_> {
                 match &step.kind {
                     EffectKind::Set { state, key, value } if matches!(value.kind, ExprKind::Match { .. }) => {
                         printer.entry_of_entries(step.span, |printer| {
-                            printer.put(&assigned(state, key.as_ref()));
+                            printer.put(&assigned(state, key.as_deref()));
                             printer.value(value);
                         });
                     }
@@ -668,7 +668,7 @@ fn assigned(state: &Name, key: Option<&Expr>) -> Layout {
 fn effect(effect: &Effect) -> Layout {
     match &effect.kind {
         EffectKind::Set { state, key, value } => Layout::group([
-            assigned(state, key.as_ref()),
+            assigned(state, key.as_deref()),
             Layout::nest([Layout::Line(" "), expression(value)]),
         ]),
         EffectKind::Order { who, fields: entries } => {

@@ -26,7 +26,7 @@ use super::q_policy::QPolicy;
 use super::registry::Agent;
 use super::replay::{Replay, Transition};
 use super::shuffled::{STATES, Shuffled};
-use super::trainable::Trainable;
+use super::trainable::{Diverged, Trainable};
 use super::trajectory::{Lesson, Trajectory};
 
 /// A learning agent.
@@ -92,13 +92,16 @@ impl Learner {
     }
 
     /// Draws a batch, improves the online network by it and renews its priorities; its loss.
-    fn update(&mut self, rng: &mut Rng) -> f64 {
+    fn update(&mut self, rng: &mut Rng) -> Result<f64, Diverged> {
         let settings = &self.settings;
         let samples = self.replay.sample(settings.batch_len, self.updates, rng);
         let batch: Vec<&Transition> = samples.iter().map(|&(index, _)| self.replay.get(index)).collect();
         let weights: Vec<f32> = samples.iter().map(|&(_, weight)| weight).collect();
         let online = &mut self.policy.network;
         let (loss, td_errors) = improve(online, &self.target, &mut self.adam, settings, &batch, &weights);
+        if !loss.is_finite() || td_errors.iter().any(|error| !error.is_finite()) {
+            return Err(Diverged { update: self.updates + 1 });
+        }
         for (&(index, _), td_error) in samples.iter().zip(td_errors) {
             self.replay.update(index, f64::from(td_error));
         }
@@ -111,7 +114,7 @@ impl Learner {
             let decay = settings.average_decay.min(1.0 - 1.0 / self.updates as f64);
             average.network.approach(&self.policy.network, (1.0 - decay) as f32);
         }
-        loss
+        Ok(loss)
     }
 }
 
@@ -145,18 +148,21 @@ impl Trainable for Learner {
     }
 
     /// Keeps what the episode showed, and makes the updates that its steps are worth.
-    fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Lesson {
+    fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Result<Lesson, Diverged> {
         let rewards = self.policy.rewards(episode);
         for transition in transitions(episode, &rewards, &self.policy) {
             self.replay.push(transition);
         }
         let settings = &self.settings;
         if self.replay.len() < settings.learning_starts {
-            return Lesson::default();
+            return Ok(Lesson::default());
         }
         let updates = episode.steps.len() as u64 * u64::from(settings.updates_per_step);
-        let losses: f64 = (0..updates).map(|_| self.update(rng)).sum();
-        Lesson { updates, loss: (updates > 0).then(|| losses / updates as f64) }
+        let mut losses = 0.0;
+        for _ in 0..updates {
+            losses += self.update(rng)?;
+        }
+        Ok(Lesson { updates, loss: (updates > 0).then(|| losses / updates as f64) })
     }
 
     fn steps(&self) -> u64 {

@@ -49,5 +49,5 @@ pub use q_policy::{Face, QPolicy, Rows};
 pub use registry::{Agent, Entry, Kind, REGISTRY, by_name};
 pub use replay::Transition;
 pub use settings::{Settings, SettingsError};
-pub use trainable::Trainable;
+pub use trainable::{Diverged, Trainable};
 pub use trajectory::{Collided, Experience, Lesson, Trajectory};

@@ -296,7 +296,7 @@ mod tests {
                     chosen.push(agent.choose(&Observation::zeros(), legal.view(), &mut rng).unwrap());
                 }
                 let mut rng = stream(9, Stream::Replay, number);
-                agent.learn(&episode(&chosen), &mut rng);
+                agent.learn(&episode(&chosen), &mut rng).unwrap();
             };
             let mut whole = settings.build(rows(), 9);
             for number in 0..40 {

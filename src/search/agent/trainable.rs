@@ -6,6 +6,13 @@ use super::q_policy::QPolicy;
 use super::registry::Agent;
 use super::trajectory::{Lesson, Trajectory};
 
+/// A network's values are no numbers any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the network diverged in update {update}: lower `learning_rate`, or bound `gradient_norm_max`")]
+pub struct Diverged {
+    pub update: u64,
+}
+
 /// An agent in training. An episode is: `progress`, `start_seed`, [`Agent::begin`], a choice for each
 /// step, `learn`.
 pub trait Trainable: Agent {
@@ -19,7 +26,10 @@ pub trait Trainable: Agent {
     }
 
     /// Takes in an episode that has been judged.
-    fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Lesson;
+    ///
+    /// # Errors
+    /// If a network's weights have grown beyond all bounds: nothing can be learned from there on.
+    fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Result<Lesson, Diverged>;
 
     /// Choices made in training.
     fn steps(&self) -> u64;

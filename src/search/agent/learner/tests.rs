@@ -124,6 +124,10 @@ fn returns_take_n_steps_and_know_the_end() {
     let released = LearnerSettings { arrival_is_terminal: false, ..settings };
     assert_eq!(discounts(of(released.clone(), true)), [0.25, 0.25, 0.5]);
     assert_eq!(of(released, true)[2].next_legal, [true, false, false, false]);
+    // Longer than the episode: all of it, and its end.
+    let longer = of(small("n_step: 50\ndiscount: 0.5"), false);
+    let figures: Vec<_> = longer.iter().map(|one| (one.reward, one.discount)).collect();
+    assert_eq!(figures, [(2.75, 0.125), (3.5, 0.25), (3.0, 0.5)]);
 }
 
 #[test]
@@ -149,7 +153,7 @@ fn on_shuffled_states_it_no_longer_knows_when() {
         let (state, row) = (number % 2, number / 2 % 2);
         let reward = f64::from(u8::from(state == row));
         let one = ended(vec![experience(state, row, reward, 2)], 9, 2);
-        learner.learn(&one, &mut stream(number as u64, Stream::Replay, 0));
+        learner.learn(&one, &mut stream(number as u64, Stream::Replay, 0)).unwrap();
     }
     let right = |mut agent: Box<dyn Agent>| {
         let chosen = |step: usize| {
@@ -164,13 +168,25 @@ fn on_shuffled_states_it_no_longer_knows_when() {
 }
 
 #[test]
+fn a_loss_that_is_no_number_ends_the_lessons() {
+    let mut learner = learner(small("loss: squared\nlearning_starts: 1\nupdates_per_step: 1"), 2, 3);
+    // Its square is beyond the numbers of a network.
+    let one = ended(vec![experience(0, 1, 1e30, 2)], 9, 2);
+    let found = learner.learn(&one, &mut stream(0, Stream::Replay, 0)).unwrap_err();
+    assert_eq!(found, Diverged { update: 1 });
+}
+
+#[test]
 fn the_mean_of_the_networks_acts_in_the_end() {
     let settings = small("average_decay: 0.75\nupdates_per_step: 1\nlearning_starts: 1");
     let mut learner = learner(settings, 4, 5);
     let mut mean: Vec<f32> = Vec::new();
     for number in 1..=6_u32 {
         let one = ended(vec![experience(0, 1, 1.0, 4)], 9, 4);
-        assert_eq!(learner.learn(&one, &mut stream(u64::from(number), Stream::Replay, 0)).updates, 1);
+        assert_eq!(
+            learner.learn(&one, &mut stream(u64::from(number), Stream::Replay, 0)).unwrap().updates,
+            1
+        );
         let online = learner.policy.network().parameters();
         // A plain mean of the first four, a running mean from then on.
         let share = 1.0 / number.min(4) as f32;
@@ -220,7 +236,7 @@ fn every_kind_of_the_algorithm_solves_a_known_problem() {
                 state = next.unwrap_or(state);
             }
             let trajectory = Trajectory { terminal, ..ended(steps, state, 2) };
-            learner.learn(&trajectory, &mut stream(episode, Stream::Replay, 0));
+            learner.learn(&trajectory, &mut stream(episode, Stream::Replay, 0)).unwrap();
         }
         // 0.6⁴ < 0.2 < 0.6³: by the discounted sum, only the leftmost state had better go left.
         let greedy: Vec<usize> =
@@ -250,7 +266,7 @@ fn mean_estimate(double: bool, seed: u64) -> f64 {
         let rows: Vec<usize> = (0..2).map(|_| rng::below(&mut rng, ROWS as u32) as usize).collect();
         let noise = rng::normal(&mut rng);
         let steps = vec![experience(0, rows[0], 0.0, ROWS), experience(1, rows[1], noise, ROWS)];
-        learner.learn(&ended(steps, 2, ROWS), &mut stream(seed, Stream::Replay, episode));
+        learner.learn(&ended(steps, 2, ROWS), &mut stream(seed, Stream::Replay, episode)).unwrap();
         if episode >= 200 {
             sum += f64::from(learner.policy.q_values(&sight(0)).mean().expect("there are rows"));
             count += 1.0;

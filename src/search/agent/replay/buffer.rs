@@ -100,8 +100,8 @@ impl Replay {
         }
     }
 
-    /// A buffer as it was saved, of transitions with so many inputs and rows; `None` if it has no room for them, or the bytes
-    /// end too soon.
+    /// A buffer as it was saved, of transitions with so many inputs and rows; `None` if it has no room for them, the bytes end
+    /// too soon, or a priority is none.
     pub(in crate::agent) fn restored(
         settings: ReplaySettings,
         (inputs, rows): (usize, usize),
@@ -115,6 +115,9 @@ impl Replay {
         let mut replay = Replay { next, priority_max, ..Replay::new(settings) };
         for index in 0..count {
             let priority = bytes.f64s(1)?[0];
+            if !(priority >= 0.0 && priority.is_finite()) {
+                return None;
+            }
             let sight = bytes.f32s(inputs)?;
             let row = u32::try_from(bytes.u64()?).ok()?;
             let figures = bytes.f32s(2)?;
@@ -252,5 +255,47 @@ mod tests {
         let mut short = empty(1.0);
         short.push(transition(7.0));
         assert_eq!(latest(&short, 3), [7.0]);
+    }
+
+    fn saved(replay: &Replay) -> Vec<u8> {
+        let mut bytes = Writer::new();
+        replay.save(&mut bytes);
+        bytes.into_bytes()
+    }
+
+    fn restored(bytes: &[u8]) -> Option<Replay> {
+        Replay::restored(empty(0.6).settings, (1, 1), &mut Reader::new(bytes)?)
+    }
+
+    #[test]
+    fn it_goes_on_as_the_one_that_was_saved_also_where_it_has_begun_anew() {
+        for pushed in 0..12 {
+            let mut replay = empty(0.6);
+            for number in 0..pushed {
+                replay.push(transition(number as f32));
+                replay.update(number % 5, f64::from(number as u32));
+            }
+            let mut again = restored(&saved(&replay)).expect("it was saved");
+            for replay in [&mut replay, &mut again] {
+                replay.push(transition(-1.0));
+            }
+            assert_eq!(saved(&replay), saved(&again), "after {pushed}");
+            let drawn = |replay: &Replay| replay.sample(8, 1, &mut stream(1, Stream::Replay, 0));
+            assert_eq!(drawn(&replay), drawn(&again), "after {pushed}");
+        }
+    }
+
+    #[test]
+    fn bytes_that_end_too_soon_or_hold_no_priority_are_no_replay() {
+        let whole = saved(&filled(0.6));
+        assert!(restored(&whole).is_some());
+        assert!((0..whole.len()).all(|length| restored(&whole[..length]).is_none()));
+        let priority = filled(0.6).tree.get(2).to_le_bytes();
+        let place = whole.windows(8).position(|window| window == priority).expect("it was saved");
+        for broken in [f64::NAN, f64::INFINITY, -1.0] {
+            let mut bytes = whole.clone();
+            bytes[place..place + 8].copy_from_slice(&broken.to_le_bytes());
+            assert!(restored(&bytes).is_none(), "{broken}");
+        }
     }
 }

@@ -16,7 +16,7 @@ use crate::agent::q_policy::Rows;
 use crate::agent::random::any;
 use crate::agent::registry::Agent;
 use crate::agent::settings::{Configured, SettingsError, require, unit, within};
-use crate::agent::trainable::Trainable;
+use crate::agent::trainable::{Diverged, Trainable};
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use avastra_base::rng;
@@ -297,12 +297,12 @@ impl Trainable for AvFuzzer {
         hunt.start_seed
     }
 
-    fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Lesson {
+    fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Result<Lesson, Diverged> {
         let crashes = episode.steps.iter().map(|step| step.crashes.len()).sum();
         let fitness = episode.closeness.fitness();
         let start = self.started_at.unwrap_or_default();
         let (settings, rows) = (self.settings.clone(), self.rows);
-        let Some(hunt) = self.hunt() else { return Lesson::default() };
+        let Some(hunt) = self.hunt() else { return Ok(Lesson::default()) };
         let individual = hunt.played();
         individual.fitness = fitness;
         let rows_played = individual.rows();
@@ -310,7 +310,7 @@ impl Trainable for AvFuzzer {
         hunt.advance(&settings, rows, rng);
         let found = Found { start, rows: rows_played, crashes, fitness };
         keep(&mut self.saved.best, found, settings.kept_scripts);
-        Lesson::default()
+        Ok(Lesson::default())
     }
 
     fn steps(&self) -> u64 {

@@ -9,7 +9,7 @@ use crate::agent::q_policy::Rows;
 use crate::agent::random::any;
 use crate::agent::registry::Agent;
 use crate::agent::settings::{Configured, SettingsError, positive, require, unit, within};
-use crate::agent::trainable::Trainable;
+use crate::agent::trainable::{Diverged, Trainable};
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use avastra_base::rng;
@@ -131,12 +131,12 @@ impl Trainable for Bandit {
         fresh
     }
 
-    fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
+    fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Result<Lesson, Diverged> {
         assert_eq!(self.made.len(), episode.steps.len(), "each choice is an experience");
         for (&(here, row), value) in self.made.iter().zip(worths(episode, self.settings.credit_discount)) {
             self.saved.worth.note(here, row, value);
         }
-        Lesson::default()
+        Ok(Lesson::default())
     }
 
     fn steps(&self) -> u64 {

@@ -12,7 +12,7 @@ use ndarray::ArrayView1;
 use crate::agent::q_policy::Rows;
 use crate::agent::registry::Agent;
 use crate::agent::settings::{Configured, SettingsError, positive, require, within};
-use crate::agent::trainable::Trainable;
+use crate::agent::trainable::{Diverged, Trainable};
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use avastra_base::rng;
@@ -118,13 +118,13 @@ impl Trainable for Constant {
         fresh
     }
 
-    fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
+    fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Result<Lesson, Diverged> {
         let counted = episode.steps.iter().map(|step| step.crashes.len()).sum::<usize>() as f64;
         self.saved.all.note(counted);
         if let Some(&leader) = self.order.first().filter(|_| self.has_led) {
             self.saved.led[leader].note(counted);
         }
-        Lesson::default()
+        Ok(Lesson::default())
     }
 
     fn steps(&self) -> u64 {
@@ -184,7 +184,7 @@ mod tests {
                 0 => number % 4 == 0,
                 _ => false,
             };
-            search.learn(&episode(usize::from(crashes)), &mut rng);
+            search.learn(&episode(usize::from(crashes)), &mut rng).unwrap();
         }
         assert!(led.iter().all(|&episodes| episodes > 0) && led[2] > 80, "{led:?}");
         let mut actor = search.actor();

@@ -15,7 +15,7 @@ use crate::agent::q_policy::Rows;
 use crate::agent::random::any;
 use crate::agent::registry::Agent;
 use crate::agent::settings::{Configured, SettingsError, require, unit, within};
-use crate::agent::trainable::Trainable;
+use crate::agent::trainable::{Diverged, Trainable};
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use avastra_base::rng;
@@ -171,7 +171,7 @@ impl Trainable for MapElites {
         self.seed
     }
 
-    fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
+    fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Result<Lesson, Diverged> {
         let found = Elite {
             seed: self.seed,
             start: self.started_at.unwrap_or_default(),
@@ -185,7 +185,7 @@ impl Trainable for MapElites {
         if elites.get(&cell).is_none_or(|elite| found.beats(elite)) {
             elites.insert(cell, found);
         }
-        Lesson::default()
+        Ok(Lesson::default())
     }
 
     fn steps(&self) -> u64 {
@@ -233,7 +233,7 @@ mod tests {
         let mut rng = rng::stream(1, Stream::Replay, 0);
         let mut play = |search: &mut MapElites, fresh, played: &Trajectory| {
             let seed = search.start_seed(0, fresh);
-            search.learn(played, &mut rng);
+            search.learn(played, &mut rng).unwrap();
             (seed, search.script.rows())
         };
         // The first start is fresh, because nothing is known; from then on that episode is changed.
@@ -258,7 +258,7 @@ mod tests {
         let mut search = MapElites::new(&settings, 45);
         let mut rng = rng::stream(1, Stream::Replay, 0);
         search.start_seed(0, 1);
-        search.learn(&episode(&[], 9.0), &mut rng);
+        search.learn(&episode(&[], 9.0), &mut rng).unwrap();
         let elite = search.script.clone();
         for fresh in 2..50 {
             assert_eq!(search.start_seed(0, fresh), 1);
