@@ -281,7 +281,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
         last = self._shown()
         ended = np.flatnonzero(self._has_ended)
         for world in ended.tolist():
-            own = {key: value[world] for key, value in last.items()} if self._is_masked else last[world]
+            own = {key: value[world] for key, value in last.items()} if isinstance(last, dict) else last[world]
             final = {**_with_whole_seed(found[world]), "action_mask": self._legal[world].copy()}
             kept = {"final_obs": own, "final_info": final}
             infos = self._add_info(infos, kept, int(world))

@@ -2,7 +2,7 @@
 //! ego vehicle kept to limit and lane.
 
 use crate::episode::EpisodeLog;
-use avastra_search::mdp::{Criticality, Encroachment};
+use avastra_search::mdp::{Criticality, LeastEncroachment};
 use avastra_world::sim::{Contact, DT_S, Scene, World};
 
 /// Half the width of a lane marking of 12 cm, m: a wheel on the line has not left the lane. Ours.
@@ -24,7 +24,7 @@ pub struct Manners {
 pub struct Gauges {
     /// Time (s) and values of every tick at which there is any danger.
     moments: Vec<(f64, Criticality)>,
-    encroachment: Encroachment,
+    encroachment: LeastEncroachment,
     hit: Vec<u32>,
     /// Time (s) and speed (m/s) of the ego vehicle at every tick before the first contact.
     speeds: Vec<(f64, f64)>,

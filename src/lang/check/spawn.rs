@@ -3,7 +3,7 @@
 use crate::check::checker::Checker;
 use crate::check::expression::Place;
 use crate::check::report::{Report, as_written, field};
-use crate::model::command::{CommandDef, Told};
+use crate::model::command::CommandDef;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{
     Colour, LaneChoice, ShownLights, Side, SpawnField, Then, Turning, Verb, Word,
@@ -12,6 +12,33 @@ use crate::model::{BodyWord, EffectDef, InRow, ManoeuvreCall, SpawnDef, Type, Wo
 use crate::syntax::ast::Span;
 use crate::syntax::{Diagnostic, ast, listed};
 use avastra_base::units::{Dimension, Rational};
+
+/// Fields that mean nothing to some verbs: to which, why, and what to know before the field is left out.
+const IDLE_FIELDS: [(SpawnField, fn(Verb) -> bool, &str, &str); 13] = {
+    const FOLLOWS: fn(Verb) -> bool = |verb| verb == Verb::Follow;
+    const ON_FOOT: fn(Verb) -> bool = |verb| verb.is_on_foot();
+    const NO_WALK: fn(Verb) -> bool = |verb| verb != Verb::Walk;
+    [
+        (SpawnField::Ignores, FOLLOWS, "minds nobody", "it follows its trajectory whatever comes; "),
+        (SpawnField::Siren, FOLLOWS, "has no driver", ""),
+        (SpawnField::Turn, FOLLOWS, "has no driver", ""),
+        (SpawnField::Lane, FOLLOWS, "begins on its trajectory", ""),
+        (SpawnField::Side, FOLLOWS, "begins on its trajectory", ""),
+        (SpawnField::Ignores, ON_FOOT, "ignores nothing", "rules of the road are for vehicles; "),
+        (SpawnField::Siren, ON_FOOT, "has no siren", ""),
+        (SpawnField::Lights, ON_FOOT, "has no lights", ""),
+        (SpawnField::Turn, ON_FOOT, "drives through no junction", ""),
+        (SpawnField::Offset, |verb| verb == Verb::Walk, "begins at the kerb", ""),
+        (SpawnField::Meet, NO_WALK, "is met at no point of the ego vehicle", "`meet` is for `Walk`; "),
+        (SpawnField::Waits, NO_WALK, "waits at no kerb", "`waits` is for `Walk`; "),
+        (
+            SpawnField::Early,
+            |verb| verb != Verb::CrossRoad,
+            "does not meet the ego vehicle at a junction",
+            "`early` is for `CrossRoad`, and for manoeuvres; ",
+        ),
+    ]
+};
 
 impl Checker {
     /// What one `spawn` makes appear: a road user, or several if it is a row.
@@ -190,7 +217,10 @@ impl Checker {
             let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(lights.span, "without effect");
             self.report(error.help("leave `lights` out"));
         }
-        self.check_fields(&fields, &verb, manoeuvre.as_ref(), span);
+        self.check_fields(&fields, &verb);
+        if let Some(given) = &manoeuvre {
+            self.check_given(given, &verb, span);
+        }
         Some(SpawnDef {
             body,
             colour: colour?,
@@ -262,96 +292,75 @@ impl Checker {
     }
 
     /// Reports fields that mean nothing to a verb.
-    fn check_fields(
-        &mut self,
-        fields: &[(SpawnField, &ast::Expr)],
-        verb: &WordExpr<Verb>,
-        manoeuvre: Option<&ManoeuvreCall>,
-        span: Span,
-    ) {
-        let has = |is_so: fn(&CommandDef) -> bool| {
-            manoeuvre.is_some_and(|call| self.has_command(call.manoeuvre, is_so))
-        };
-        let keeps_to_ego = has(|command| command.keep.is_some() && command.to.is_none());
+    fn check_fields(&mut self, fields: &[(SpawnField, &ast::Expr)], verb: &WordExpr<Verb>) {
+        let verbs = possible(verb);
+        for (wanted, is_idle, what, help) in IDLE_FIELDS {
+            let idle = verbs.iter().find(|verb| is_idle(**verb));
+            if let (Some(value), Some(verb)) = (field(fields, wanted), idle) {
+                let message = format!("`{}` {what}", verb.name());
+                let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message);
+                let help = format!("{help}leave `{}` out", wanted.name());
+                self.report(error.at(value.span, "without effect").help(help));
+            }
+        }
+        let (meet, waits) = (field(fields, SpawnField::Meet), field(fields, SpawnField::Waits));
+        if let (Some(_), Some(waits)) = (meet, waits) {
+            let message = "it sets out after a time or for a meeting";
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(waits.span, "both are said");
+            self.report(error.help("leave `waits` or `meet` out"));
+        }
+        self.check_place_fields(fields, &verbs);
+    }
+
+    /// Reports a manoeuvre that tells somebody what it cannot be told: the first reason alone.
+    fn check_given(&mut self, given: &ManoeuvreCall, verb: &WordExpr<Verb>, span: Span) {
+        let has = |is_so: fn(&CommandDef) -> bool| self.has_command(given.manoeuvre, is_so);
         let keeps = has(|command| command.keep.is_some());
+        let keeps_to_ego = has(|command| command.keep.is_some() && command.to.is_none());
         let changes_lanes = has(|command| command.lane.is_some());
-        let told = manoeuvre.map_or(Told::NOTHING, |call| self.told(call.manoeuvre));
         let goes_back = has(CommandDef::goes_back);
         let meets_nowhere = has(|command| command.early.is_some() && command.reach.is_none());
-        self.check_place_fields(fields, &possible(verb));
+        let told = self.told(given.manoeuvre);
         for verb in possible(verb) {
-            let on_foot = verb.is_on_foot();
+            let is_lacked = told.lacked_by(verb).is_some();
             let other_way = matches!(verb, Verb::DriveOpposite | Verb::CrossRoad);
-            let says = |wanted: SpawnField| field(fields, wanted).is_some();
-            let follows = verb == Verb::Follow;
-            let (what, help) = match () {
-                () if verb == Verb::Stand && manoeuvre.is_some() => (
+            let (what, help) = match verb {
+                Verb::Stand => (
                     "does no manoeuvre",
                     "leave `then` out, or let it `Walk`, with `speed: 0 m/s` until it is told",
                 ),
-                () if told.lacked_by(verb).is_some() && verb == Verb::Walk => (
+                Verb::Walk if is_lacked => (
                     "is told a `speed` alone",
                     "the other fields of its manoeuvre are not for who crosses the road; leave them out",
                 ),
-                () if told.lacked_by(verb).is_some() && on_foot => (
+                _ if is_lacked && verb.is_on_foot() => (
                     "is told a `speed`, an `offset` and an `aside` alone",
                     "the other fields of its manoeuvre are for vehicles; leave them out",
                 ),
-                () if told.lacked_by(verb).is_some() && follows => (
+                Verb::Follow if is_lacked => (
                     "has no driver",
                     "give its manoeuvre a `speed`, `rate`, `offset`, `aside`, `early`, `at`, `reach` and `steady` alone",
                 ),
-                () if told.lacked_by(verb).is_some() => (
+                _ if is_lacked => (
                     "follows no trajectory",
                     "`reach` and `steady` are for `Follow`; leave them out of its manoeuvre",
                 ),
-                () if follows && meets_nowhere => (
+                Verb::Follow if meets_nowhere => (
                     "is `early` at a place of its trajectory",
                     "say in its manoeuvre where, `reach: 30 m`, and where the ego vehicle is then, `at: …`",
                 ),
-                () if follows && says(SpawnField::Ignores) => {
-                    ("minds nobody", "it follows its trajectory whatever comes; leave `ignores` out")
-                }
-                () if follows && (says(SpawnField::Siren) || says(SpawnField::Turn)) => {
-                    ("has no driver", "leave `siren` and `turn` out")
-                }
-                () if follows && (says(SpawnField::Lane) || says(SpawnField::Side)) => {
-                    ("begins on its trajectory", "leave `lane` and `side` out")
-                }
-                () if !on_foot && !follows && goes_back => {
+                _ if goes_back && !verb.is_on_foot() && verb != Verb::Follow => {
                     ("does not drive backwards", "give its manoeuvre no speed below 0 m/s")
                 }
-                () if on_foot && says(SpawnField::Ignores) => {
-                    ("ignores nothing", "rules of the road are for vehicles; leave `ignores` out")
-                }
-                () if on_foot && says(SpawnField::Siren) => ("has no siren", "leave `siren` out"),
-                () if on_foot && says(SpawnField::Lights) => ("has no lights", "leave `lights` out"),
-                () if on_foot && says(SpawnField::Turn) => ("drives through no junction", "leave `turn` out"),
-                () if verb == Verb::Walk && says(SpawnField::Offset) => {
-                    ("begins at the kerb", "leave `offset` out")
-                }
-                () if verb != Verb::Walk && says(SpawnField::Meet) => {
-                    ("is met at no point of the ego vehicle", "`meet` is for `Walk`; leave it out")
-                }
-                () if verb != Verb::Walk && says(SpawnField::Waits) => {
-                    ("waits at no kerb", "`waits` is for `Walk`; leave it out")
-                }
-                () if verb != Verb::CrossRoad && says(SpawnField::Early) => (
-                    "does not meet the ego vehicle at a junction",
-                    "`early` is for `CrossRoad`, and for manoeuvres; leave it out",
-                ),
-                () if says(SpawnField::Meet) && says(SpawnField::Waits) => {
-                    ("sets out after a time or for a meeting", "leave `waits` or `meet` out")
-                }
-                () if keeps_to_ego && other_way || keeps && verb == Verb::CrossRoad => (
+                _ if keeps_to_ego && other_way || keeps && verb == Verb::CrossRoad => (
                     "does not drive in the ego vehicle's direction",
                     "a gap is kept ahead of it or behind it; write `early` in its manoeuvre",
                 ),
-                () if other_way && changes_lanes => (
+                _ if other_way && changes_lanes => (
                     "drives in no lane of the ego vehicle's direction",
                     "in its manoeuvre, write `offset` for `lane`",
                 ),
-                () => continue,
+                _ => continue,
             };
             let message = format!("`{}` {what}", verb.name());
             let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");

@@ -101,13 +101,16 @@ pub fn time_to_collision_s(world: &World, obstacle: &Obstacle) -> Option<f64> {
     if obstacle.distance_m > relative_mps.norm() * TTC_S_MAX {
         return None;
     }
-    let sweep = |start: OrientedBox, velocity_mps: Vec2| {
+    touch_s((ego, ego_velocity_mps), (obstacle.outline, obstacle.velocity_mps))
+}
+
+/// When two outlines that keep their velocities and headings touch, s; `None` beyond 8 s.
+fn touch_s(one: (OrientedBox, Vec2), other: (OrientedBox, Vec2)) -> Option<f64> {
+    let sweep = |(start, velocity_mps): (OrientedBox, Vec2)| {
         let position = start.pose.position + velocity_mps * TTC_S_MAX;
         Sweep { start, end: Pose { position, heading_rad: start.pose.heading_rad } }
     };
-    let first =
-        first_contact(&sweep(ego, ego_velocity_mps), &sweep(obstacle.outline, obstacle.velocity_mps))?;
-    Some(first.fraction * TTC_S_MAX)
+    Some(first_contact(&sweep(one), &sweep(other))?.fraction * TTC_S_MAX)
 }
 
 /// An obstacle in the frame of the ego vehicle.
@@ -161,9 +164,11 @@ impl Seen {
     }
 }
 
-/// Post-encroachment time: from when one road user leaves a place where ways cross until the other comes.
+/// The least post-encroachment time of an episode: from when one road user leaves a place where ways cross until the other
+/// comes. Requirements ask at every tick how long ago somebody left the place (`sim::Encroachment`); here it is looked every
+/// 0.1 s, and only ways that cross count.
 #[derive(Debug, Clone, Default)]
-pub struct Encroachment {
+pub struct LeastEncroachment {
     /// Outline of the ego vehicle every 0.1 s.
     ego: Vec<OrientedBox>,
     others: Vec<Trail>,
@@ -177,7 +182,7 @@ struct Trail {
     outlines: Vec<OrientedBox>,
 }
 
-impl Encroachment {
+impl LeastEncroachment {
     /// Records the world of this moment, at one tick of five.
     pub fn note(&mut self, world: &World) {
         if !world.ticks().is_multiple_of(FRAME_TICKS) {
@@ -249,9 +254,28 @@ mod tests {
     }
 
     #[test]
+    fn the_time_to_a_collision_is_that_of_the_outlines() {
+        let outline = |x_m, y_m, heading_rad| OrientedBox::new(Pose::new(x_m, y_m, heading_rad), 4.0, 2.0);
+        let ego = (outline(0.0, 0.0, 0.0), Vec2::new(10.0, 0.0));
+        let met_s = |x_m, y_m, heading_rad, x_mps, y_mps| {
+            touch_s(ego, (outline(x_m, y_m, heading_rad), Vec2::new(x_mps, y_mps)))
+        };
+        let is_near = |found: Option<f64>, wanted_s: f64| found.is_some_and(|s| (s - wanted_s).abs() < 1e-6);
+        // 20 m between the bumpers; one that stands, one that comes, one that drives away.
+        assert!(is_near(met_s(24.0, 0.0, 0.0, 0.0, 0.0), 2.0));
+        assert!(is_near(met_s(24.0, 0.0, 0.0, -10.0, 0.0), 1.0));
+        assert_eq!(met_s(24.0, 0.0, 0.0, 10.0, 0.0), None);
+        // From the right, half a car's length and half a car's width to go: 17 m at 10 m/s.
+        assert!(is_near(met_s(20.0, -20.0, core::f64::consts::FRAC_PI_2, 0.0, 10.0), 1.7));
+        // A metre beside the ego vehicle's way, and beyond 8 s.
+        assert_eq!(met_s(24.0, 3.0, 0.0, 0.0, 0.0), None);
+        assert_eq!(met_s(90.0, 0.0, 0.0, 0.0, 0.0), None);
+    }
+
+    #[test]
     fn the_time_between_two_at_a_crossing_is_found() {
         // The ego vehicle leaves the crossing to the right at 10 m/s; a vehicle comes up from below later.
-        let mut encroachment = Encroachment::default();
+        let mut encroachment = LeastEncroachment::default();
         let outline = |x_m, y_m, heading_rad| OrientedBox::new(Pose::new(x_m, y_m, heading_rad), 4.0, 2.0);
         let upwards_rad = core::f64::consts::FRAC_PI_2;
         let mut outlines = Vec::new();

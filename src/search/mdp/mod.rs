@@ -14,7 +14,7 @@ mod state;
 
 pub use closeness::Closeness;
 pub use collision_probability::{Danger, ProcKind};
-pub use criticality::{Criticality, Encroachment};
+pub use criticality::{Criticality, LeastEncroachment};
 pub use observation::{Observation, variable};
 pub use reward::{RewardSettings, StepOutcome, reward};
 pub use state::{PerceptionCounts, STATE_LEN, StateVector, perception_counts};
