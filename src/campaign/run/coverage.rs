@@ -1,7 +1,7 @@
 //! What a run or a training did, in more detail than its totals: rows on roads, and the episodes of a training.
 
 use crate::run::database::Database;
-use crate::run::sealed::{DatabaseError, query_all};
+use crate::run::sealed::{DatabaseError, of_columns, query_all};
 
 /// What became of a row on a road.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -52,15 +52,7 @@ impl Database {
                   LEFT JOIN chosen USING (road, action_row)
              ORDER BY road, action_row";
         query_all(&self.connection, query, |row| {
-            Ok(CoverageCell {
-                road: row.get(0)?,
-                row: row.get(1)?,
-                legal: row.get(2)?,
-                refused: row.get(3)?,
-                chosen: row.get(4)?,
-                realised: row.get(5)?,
-                why: row.get(6)?,
-            })
+            Ok(of_columns!(row, 0, CoverageCell { road, row, legal, refused, chosen, realised, why }))
         })
     }
 
@@ -71,13 +63,7 @@ impl Database {
     pub fn learning(&self) -> Result<Vec<LearningPoint>, DatabaseError> {
         let query = "SELECT episode, return, counted, epsilon, loss FROM learning ORDER BY episode";
         query_all(&self.connection, query, |row| {
-            Ok(LearningPoint {
-                episode: row.get(0)?,
-                reward: row.get(1)?,
-                counted: row.get(2)?,
-                exploration: row.get(3)?,
-                loss: row.get(4)?,
-            })
+            Ok(of_columns!(row, 0, LearningPoint { episode, reward, counted, exploration, loss }))
         })
     }
 }

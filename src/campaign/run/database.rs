@@ -19,7 +19,7 @@ use avastra_search::mdp::STATE_LEN;
 use avastra_world::action::Draw;
 
 use crate::run::offered::{RowCount, without_figures};
-use crate::run::sealed::{DatabaseError, Layout, insert_row, query_all};
+use crate::run::sealed::{DatabaseError, Layout, insert_row, of_columns, query_all};
 use crate::run::settled::{Units, WrittenScenario};
 use crate::run::summary::{EpisodeSummary, Finding};
 
@@ -387,36 +387,17 @@ impl Database {
                  FROM episode",
             [],
             |row| {
-                Ok(Totals {
-                    episodes: row.get(0)?,
-                    collisions: row.get(1)?,
-                    counted: row.get(2)?,
-                    episodes_with_collision: row.get(3)?,
-                    episodes_with_counted: row.get(4)?,
-                    arrived: row.get(5)?,
-                    stalled: row.get(6)?,
-                    step_limit: row.get(7)?,
-                    simulated_s: row.get(8)?,
-                    driven_m: row.get(9)?,
-                    red_runs: row.get(10)?,
-                    first_counted_s_mean: row.get(11)?,
-                    sudden: row.get(12)?,
-                    struck: row.get(13)?,
-                    repeated: row.get(14)?,
-                    avoidable: row.get(15)?,
-                    beyond_reference: row.get(16)?,
-                    unavoidable: row.get(17)?,
-                    branched_s: row.get(18)?,
-                    wronged: row.get(19)?,
-                    wrong: row.get(20)?,
-                    blocked: row.get(21)?,
-                    failed: row.get(22)?,
-                    astray: row.get(23)?,
-                    left_map: row.get(24)?,
-                    episodes_with_breach: row.get(25)?,
-                    replayed: row.get(26)?,
-                    recurring: row.get(27)?,
-                })
+                let totals = of_columns!(
+                    row,
+                    0,
+                    Totals {
+                        episodes, collisions, counted, episodes_with_collision, episodes_with_counted, arrived,
+                        stalled, step_limit, simulated_s, driven_m, red_runs, first_counted_s_mean, sudden,
+                        struck, repeated, avoidable, beyond_reference, unavoidable, branched_s, wronged, wrong,
+                        blocked, failed, astray, left_map, episodes_with_breach, replayed, recurring,
+                    }
+                );
+                Ok(totals)
             },
         )?)
     }

@@ -46,7 +46,7 @@ pub(crate) use profile::{traffic_of, under_test};
 pub use protocol::{Ending, HeatMap, ProtocolTest, Tally, heat_maps, main_maps, parameters};
 pub use sealed::differences as settings_differences;
 pub use sealed::{DatabaseError, Layout};
-pub(crate) use sealed::{insert_row, query_all, settings_digest};
+pub(crate) use sealed::{insert_row, of_columns, query_all, settings_digest};
 pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};
 pub(crate) use settings::{agent_named, check_episodes};
 pub use settled::{Numbered, Units, WrittenScenario};

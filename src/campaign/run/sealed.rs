@@ -395,6 +395,17 @@ pub(crate) fn insert_row(
     Ok(())
 }
 
+/// A struct of the columns of a row, from one on: `of_columns!(row, 0, Totals { episodes, collisions })`. The fields stand in the
+/// order of the columns.
+macro_rules! of_columns {
+    ($row:expr, $first:literal, $of:ident { $($field:ident),+ $(,)? }) => {{
+        let mut columns = $first..;
+        let mut next = || columns.next().expect("there is always one more number");
+        $of { $($field: $row.get::<usize, _>(next())?),+ }
+    }};
+}
+pub(crate) use of_columns;
+
 /// All rows of a query, each as `read` gives it.
 pub(crate) fn query_all<T>(
     connection: &Connection,

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use rusqlite::types::Type as Kind;
 use rusqlite::{Connection, Row, params};
 
-use crate::run::{DatabaseError, Layout, Numbered, Units, insert_row, query_all};
+use crate::run::{DatabaseError, Layout, Numbered, Units, insert_row, of_columns, query_all};
 
 use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, TrainedRecord};
 use crate::study::settings::StudySettings;
@@ -241,15 +241,11 @@ fn add_episode(
 }
 
 fn trained_episode(row: &Row) -> Result<TrainedRecord, rusqlite::Error> {
-    Ok(TrainedRecord {
-        ended: row.get(1)?,
-        sum: row.get(2)?,
-        collisions: row.get(3)?,
-        counted: row.get(4)?,
-        exploration_epsilon: row.get(5)?,
-        loss: row.get(6)?,
-        simulated_s: row.get(7)?,
-    })
+    Ok(of_columns!(
+        row,
+        1,
+        TrainedRecord { ended, sum, collisions, counted, exploration_epsilon, loss, simulated_s }
+    ))
 }
 
 /// An episode without its collisions: they are in a table of their own.

@@ -285,103 +285,37 @@ struct Figure {
     value: fn(&mut Command) -> &mut Option<f64>,
 }
 
-const FIGURES: [Figure; 12] = [
-    Figure {
-        field: CommandField::Speed,
-        unit: "m/s",
-        bounds: SPEED_MPS,
-        may_be_left_out: false,
-        written: |def| def.speed.as_ref(),
-        value: |command| &mut command.speed_mps,
-    },
-    Figure {
-        field: CommandField::Rate,
-        unit: "m/s^2",
-        bounds: RATE_MPS2,
-        may_be_left_out: true,
-        written: |def| def.rate.as_ref(),
-        value: |command| &mut command.rate_mps2,
-    },
-    Figure {
-        field: CommandField::Offset,
-        unit: "m",
-        bounds: OFFSET_M,
-        may_be_left_out: false,
-        written: |def| def.offset.as_ref(),
-        value: |command| &mut command.offset_m,
-    },
-    Figure {
-        field: CommandField::Aside,
-        unit: "m/s",
-        bounds: ASIDE_MPS,
-        may_be_left_out: true,
-        written: |def| def.aside.as_ref().filter(|aside| aside.ty == Type::Quantity(Dimension::SPEED)),
-        value: |command| &mut command.aside_mps,
-    },
-    Figure {
-        field: CommandField::Aside,
-        unit: "s",
-        bounds: ASIDE_S,
-        may_be_left_out: true,
-        written: |def| def.aside.as_ref().filter(|aside| aside.ty == Type::Quantity(Dimension::DURATION)),
-        value: |command| &mut command.aside_s,
-    },
-    Figure {
-        field: CommandField::TimeGap,
-        unit: "s",
-        bounds: TIME_GAP_S,
-        may_be_left_out: true,
-        written: |def| def.time_gap.as_ref(),
-        value: |command| &mut command.time_gap_s,
-    },
-    Figure {
-        field: CommandField::Keep,
-        unit: "m",
-        bounds: KEEP_M,
-        may_be_left_out: false,
-        written: |def| def.keep.as_ref().filter(|keep| keep.ty == Type::Quantity(Dimension::LENGTH)),
-        value: |command| &mut command.keep_m,
-    },
-    Figure {
-        field: CommandField::Keep,
-        unit: "s",
-        bounds: TIME_GAP_S,
-        may_be_left_out: false,
-        written: |def| def.keep.as_ref().filter(|keep| keep.ty == Type::Quantity(Dimension::DURATION)),
-        value: |command| &mut command.keep_s,
-    },
-    Figure {
-        field: CommandField::Early,
-        unit: "s",
-        bounds: EARLY_S,
-        may_be_left_out: false,
-        written: |def| def.early.as_ref(),
-        value: |command| &mut command.early_s,
-    },
-    Figure {
-        field: CommandField::At,
-        unit: "m",
-        bounds: AT_M,
-        may_be_left_out: false,
-        written: |def| def.at.as_ref(),
-        value: |command| &mut command.at_m,
-    },
-    Figure {
-        field: CommandField::Reach,
-        unit: "m",
-        bounds: AT_M,
-        may_be_left_out: false,
-        written: |def| def.reach.as_ref(),
-        value: |command| &mut command.reach_m,
-    },
-    Figure {
-        field: CommandField::Steady,
-        unit: "m",
-        bounds: AT_M,
-        may_be_left_out: true,
-        written: |def| def.steady.as_ref(),
-        value: |command| &mut command.steady_m,
-    },
+/// One row a figure: its field, unit and bounds, whether it may be left out, and from where it goes to where. A field of two
+/// dimensions is two figures.
+macro_rules! figures {
+    ($(($field:ident, $unit:literal, $bounds:ident, $left_out:literal,
+        $from:ident $(in $dimension:ident)? => $into:ident)),+ $(,)?) => {
+        [$(Figure {
+            field: CommandField::$field,
+            unit: $unit,
+            bounds: $bounds,
+            may_be_left_out: $left_out,
+            written: |def| {
+                def.$from.as_ref()$(.filter(|expr| expr.ty == Type::Quantity(Dimension::$dimension)))?
+            },
+            value: |command| &mut command.$into,
+        }),+]
+    };
+}
+
+const FIGURES: [Figure; 12] = figures![
+    (Speed, "m/s", SPEED_MPS, false, speed => speed_mps),
+    (Rate, "m/s^2", RATE_MPS2, true, rate => rate_mps2),
+    (Offset, "m", OFFSET_M, false, offset => offset_m),
+    (Aside, "m/s", ASIDE_MPS, true, aside in SPEED => aside_mps),
+    (Aside, "s", ASIDE_S, true, aside in DURATION => aside_s),
+    (TimeGap, "s", TIME_GAP_S, true, time_gap => time_gap_s),
+    (Keep, "m", KEEP_M, false, keep in LENGTH => keep_m),
+    (Keep, "s", TIME_GAP_S, false, keep in DURATION => keep_s),
+    (Early, "s", EARLY_S, false, early => early_s),
+    (At, "m", AT_M, false, at => at_m),
+    (Reach, "m", AT_M, false, reach => reach_m),
+    (Steady, "m", AT_M, true, steady => steady_m),
 ];
 
 /// A figure as the file says it, with its unit and its bounds.
