@@ -13,8 +13,10 @@ use crate::syntax::ast::Span;
 use crate::syntax::{Diagnostic, ast, listed};
 use avastra_base::units::{Dimension, Rational};
 
-/// Fields that mean nothing to some verbs: to which, why, and what to know before the field is left out.
-const IDLE_FIELDS: [(SpawnField, fn(Verb) -> bool, &str, &str); 13] = {
+/// A field that means nothing to some verbs: to which, why, and what to know before the field is left out.
+type IdleField = (SpawnField, fn(Verb) -> bool, &'static str, &'static str);
+
+const IDLE_FIELDS: [IdleField; 13] = {
     const FOLLOWS: fn(Verb) -> bool = |verb| verb == Verb::Follow;
     const ON_FOOT: fn(Verb) -> bool = |verb| verb.is_on_foot();
     const NO_WALK: fn(Verb) -> bool = |verb| verb != Verb::Walk;

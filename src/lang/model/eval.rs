@@ -8,7 +8,7 @@ use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Who};
 use crate::model::space::{BodyWord, COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::{
-    Crossing, Fact, LaneChoice, Light, NearWord, PastWord, Priority, RoadKind, Turn, Word, WordFact,
+    Crossing, LaneChoice, Light, NearWord, PastWord, Priority, RoadKind, Turn, Word, WordFact,
 };
 
 /// Numbers that differ by at most this part of the larger one are equal, and their difference is 0, unless both are whole.
@@ -273,14 +273,12 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
         ExprKind::Local(index) => facts.locals[*index],
         ExprKind::Cell(cell) => facts.memory.cells[*cell],
         ExprKind::CellAt(first, key) => facts.memory.cells[first + value(key).variant()],
-        ExprKind::Fact(fact) => fact_value(*fact, facts),
+        ExprKind::Fact(fact) => fact.value(facts),
         ExprKind::OfRoadUser(id, fact) => {
             let mut users = facts.world.into_iter().flat_map(|world| &world.road_users);
-            fact_value(*fact, &about(users.find(|(known, _)| known == id).map(|(_, npc)| *npc), facts))
+            fact.value(&about(users.find(|(known, _)| known == id).map(|(_, npc)| *npc), facts))
         }
-        ExprKind::OfBearer(who, fact) => {
-            fact_value(*fact, &about(bearer(who.bearer(facts.locals), facts), facts))
-        }
+        ExprKind::OfBearer(who, fact) => fact.value(&about(bearer(who.bearer(facts.locals), facts), facts)),
         ExprKind::Since(actions, _) => Value::Number(facts.world.map_or(f64::NAN, |world| {
             let happened_s = |action: &usize| world.happened_s.get(*action).copied();
             let last_s = actions.iter().filter_map(happened_s).fold(f64::NEG_INFINITY, f64::max);
@@ -362,128 +360,6 @@ fn bearer(who: usize, facts: &Facts<'_>) -> Option<NpcFacts> {
 /// The same facts, with this road user, if it is there, as the newcomer.
 pub(crate) fn about<'a>(npc: Option<NpcFacts>, facts: &Facts<'a>) -> Facts<'a> {
     Facts { spawn: npc.map(|npc| SpawnFacts { npc, ..SpawnFacts::default() }), ..*facts }
-}
-
-fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
-    let spawn = |of: fn(&SpawnFacts) -> f64| Value::Number(facts.spawn.as_ref().map_or(f64::NAN, of));
-    let world = |of: Option<f64>| Value::Number(of.unwrap_or(f64::NAN));
-    match fact {
-        Fact::EgoSpeed
-        | Fact::EgoAcceleration
-        | Fact::EgoLimit
-        | Fact::EgoJunctionAhead
-        | Fact::EgoJunctionEnd
-        | Fact::EgoLaneWidth
-        | Fact::EgoLightSince
-        | Fact::EgoLightLeft
-        | Fact::EgoCrosswalkAhead
-        | Fact::EgoRouteLeft
-        | Fact::EgoOffset
-        | Fact::EgoFront
-        | Fact::EgoRear
-        | Fact::RoadUsers
-        | Fact::RuleBreakers
-        | Fact::NearestGap
-        | Fact::NearestSpeed
-        | Fact::Elapsed => world(facts.world.zip(of_moment(fact)).map(|(world, of)| of(&world.moment))),
-        Fact::EgoLeadGap
-        | Fact::EgoLeadSpeed
-        | Fact::EgoLeadSince
-        | Fact::EgoOverRed
-        | Fact::EgoOverStop
-        | Fact::EgoLateralAcceleration
-        | Fact::EgoOverLine
-        | Fact::EgoOverCrosswalk
-        | Fact::EgoLaneOffset
-        | Fact::EgoOverOncoming
-        | Fact::EgoOverLane
-        | Fact::EgoVisibility
-        | Fact::EgoJerk => world(facts.world.zip(of_tick(fact)).map(|(world, of)| of(&world.tick))),
-        Fact::RoadLimit => Value::Number(facts.road.map_or(f64::NAN, |road| road.limit_mps)),
-        Fact::StepNumber => Value::Number(facts.world.map_or(f64::NAN, |world| world.step as f64)),
-        Fact::NpcSpeed => spawn(|spawn| spawn.npc.speed_mps),
-        Fact::NpcAcceleration => spawn(|spawn| spawn.npc.acceleration_mps2),
-        Fact::NpcGap => spawn(|spawn| spawn.npc.gap_m),
-        Fact::NpcJunctionAhead => spawn(|spawn| spawn.npc.junction_ahead_m),
-        Fact::NpcCrossingAhead => spawn(|spawn| spawn.npc.crossing_ahead_m),
-        Fact::NpcEgoCrossingAhead => spawn(|spawn| spawn.npc.ego_crossing_ahead_m),
-        Fact::NpcLaneLeft => spawn(|spawn| spawn.npc.lane_left_m),
-        Fact::NpcLightSince => spawn(|spawn| spawn.npc.light_times.since_s),
-        Fact::NpcLightLeft => spawn(|spawn| spawn.npc.light_times.left_s),
-        Fact::NpcLimit => spawn(|spawn| spawn.npc.limit_mps),
-        Fact::NpcFront => spawn(|spawn| spawn.npc.front_m),
-        Fact::NpcRear => spawn(|spawn| spawn.npc.rear_m),
-        Fact::NpcOffset => spawn(|spawn| spawn.npc.offset_m),
-        Fact::NpcTtc => spawn(|spawn| spawn.npc.ttc_s),
-        Fact::NpcHeadway => spawn(|spawn| spawn.npc.headway_s),
-        Fact::NpcAlong => spawn(|spawn| spawn.npc.along_mps),
-        Fact::NpcAcross => spawn(|spawn| spawn.npc.across_mps),
-        Fact::NpcAside => spawn(|spawn| spawn.npc.aside_m),
-        Fact::NpcInLane => spawn(|spawn| spawn.npc.in_lane_m),
-        Fact::NpcCrosswalkGap => spawn(|spawn| spawn.npc.crosswalk_gap_m),
-        Fact::NpcNextCrosswalkGap => spawn(|spawn| spawn.npc.next_crosswalk_gap_m),
-        Fact::NpcContactIn => spawn(|spawn| spawn.npc.contact_in_s),
-        Fact::NpcPet => spawn(|spawn| spawn.npc.pet_s),
-        Fact::NpcLeads => Value::Bool(facts.spawn.is_some_and(|spawn| spawn.npc.leads)),
-        Fact::NpcLanesLeft => spawn(|spawn| f64::from(spawn.npc.lanes_left)),
-        Fact::NpcOffRoad => spawn(|spawn| spawn.npc.off_road_m),
-        Fact::NpcInNextJunction => Value::Bool(facts.spawn.is_some_and(|spawn| spawn.npc.in_next_junction)),
-        Fact::NpcStation => spawn(|spawn| spawn.npc.station_m),
-        Fact::NpcSiren => Value::Bool(facts.spawn.is_some_and(|spawn| spawn.npc.has_siren)),
-        Fact::SpawnGap => spawn(|spawn| spawn.spawn_gap_m),
-        Fact::SafetyGap => spawn(|spawn| spawn.safety_gap_m),
-        Fact::Proc => Value::Number(facts.outcome.proc),
-        Fact::Collision => Value::Bool(facts.outcome.collision),
-        Fact::Repeated => Value::Bool(facts.outcome.repeated),
-        Fact::Sudden => Value::Bool(facts.outcome.sudden),
-        Fact::Struck => Value::Bool(facts.outcome.struck),
-        Fact::Avoidable => Value::Bool(facts.outcome.avoidable),
-    }
-}
-
-/// What a fact of the moment is; `None` for another one.
-pub(crate) fn of_moment(fact: Fact) -> Option<fn(&MomentFacts) -> f64> {
-    Some(match fact {
-        Fact::EgoSpeed => |moment| moment.ego_speed_mps,
-        Fact::EgoAcceleration => |moment| moment.ego_acceleration_mps2,
-        Fact::EgoLimit => |moment| moment.ego_limit_mps,
-        Fact::EgoJunctionAhead => |moment| moment.ego_junction_ahead_m,
-        Fact::EgoJunctionEnd => |moment| moment.ego_junction_end_m,
-        Fact::EgoLaneWidth => |moment| moment.ego_lane_width_m,
-        Fact::EgoLightSince => |moment| moment.ego_light_times.since_s,
-        Fact::EgoLightLeft => |moment| moment.ego_light_times.left_s,
-        Fact::EgoCrosswalkAhead => |moment| moment.ego_crosswalk_ahead_m,
-        Fact::EgoRouteLeft => |moment| moment.ego_route_left_m,
-        Fact::EgoOffset => |moment| moment.ego_offset_m,
-        Fact::EgoFront => |moment| moment.ego_front_m,
-        Fact::EgoRear => |moment| moment.ego_rear_m,
-        Fact::RoadUsers => |moment| f64::from(moment.road_users),
-        Fact::RuleBreakers => |moment| f64::from(moment.rule_breakers),
-        Fact::NearestGap => |moment| moment.nearest_gap_m,
-        Fact::NearestSpeed => |moment| moment.nearest_speed_mps,
-        Fact::Elapsed => |moment| moment.elapsed_s,
-        _ => return None,
-    })
-}
-
-/// What a fact that is watched at every tick is; `None` for another one.
-pub(crate) fn of_tick(fact: Fact) -> Option<fn(&TickFacts) -> f64> {
-    Some(match fact {
-        Fact::EgoLeadGap => |tick| tick.lead_gap_m,
-        Fact::EgoLeadSpeed => |tick| tick.lead_speed_mps,
-        Fact::EgoLeadSince => |tick| tick.lead_since_s,
-        Fact::EgoOverRed => |tick| tick.over_red_m,
-        Fact::EgoOverStop => |tick| tick.over_stop_m,
-        Fact::EgoOverLine => |tick| tick.over_line_m,
-        Fact::EgoOverCrosswalk => |tick| tick.over_crosswalk_m,
-        Fact::EgoLaneOffset => |tick| tick.lane_offset_m,
-        Fact::EgoOverOncoming => |tick| tick.over_oncoming_m,
-        Fact::EgoOverLane => |tick| tick.over_lane_m,
-        Fact::EgoVisibility => |tick| tick.visibility_m,
-        Fact::EgoJerk => |tick| tick.jerk_mps3,
-        Fact::EgoLateralAcceleration => |tick| tick.lateral_mps2,
-        _ => return None,
-    })
 }
 
 /// The word that a fact is; `None` where it is not known.

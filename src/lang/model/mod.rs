@@ -12,6 +12,7 @@ mod digest;
 pub mod effort;
 mod eval;
 pub mod expr;
+mod fact;
 mod interval;
 mod limits;
 mod meaning;

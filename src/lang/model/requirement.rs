@@ -7,8 +7,7 @@
 use std::collections::VecDeque;
 
 use crate::model::eval::{
-    Facts, MomentFacts, NearFacts, TickFacts, about, arithmetic, compare_numbers, evaluate, of_moment,
-    of_tick,
+    Facts, MomentFacts, NearFacts, TickFacts, about, arithmetic, compare_numbers, evaluate,
 };
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::limits::TICK_MS;
@@ -409,7 +408,7 @@ impl Node {
         let is_number = |expr: &Expr| matches!(expr.ty, Type::Int | Type::Quantity(_));
         match &expr.kind {
             ExprKind::Number(number) => Node::Number(number.to_f64()),
-            ExprKind::Fact(fact) => match (of_moment(*fact), of_tick(*fact)) {
+            ExprKind::Fact(fact) => match (fact.of_moment(), fact.of_tick()) {
                 (Some(of), _) => Node::Fact(Of::Moment(of)),
                 (None, Some(of)) => Node::Fact(Of::Tick(of)),
                 (None, None) => Node::Other(expr.clone()),

@@ -1,15 +1,17 @@
 //! The table of the engine's words: facts, fields, claims, and what a `spawn`, a `set time` or a `set sky`
 //! may mean.
-//! A row holds the spelling of a word and one sentence for people. A fact also has its type, and becomes known at a
-//! stated time; that time decides where it may be read and when a rule that reads it is judged. The checker, the
-//! editor's server, the highlighter and the test of LANGUAGE.md read the rows. Keywords stand in `syntax::keyword`,
-//! because the grammar knows them.
+//! A row holds the spelling of a word and one sentence for people. The facts have a table of their own (`fact`). Each becomes
+//! known at a stated time ([`Known`]), which decides where it may be read and when a rule that reads it is judged. The
+//! checker, the editor's server, the highlighter and the test of LANGUAGE.md read the rows. Keywords stand in
+//! `syntax::keyword`, because the grammar knows them.
 //!
 //! Enums are the author's; the names of their variants must be found here wherever a value reaches
 //! the world.
 
 use crate::model::value::Type;
 use avastra_base::units::Dimension;
+
+pub use crate::model::fact::Fact;
 
 /// A word of the engine: it has a spelling, and the spelling finds it again.
 pub trait Word: Copy + PartialEq + 'static {
@@ -56,23 +58,7 @@ macro_rules! words {
     (@last $only:expr) => { $only };
     (@last $first:expr, $second:expr) => { $second };
 }
-
-/// Declares the facts: words with a type and the moment from which they are known.
-macro_rules! facts {
-    ($($fact:ident $spelling:literal $ty:expr, $known:ident = $meaning:literal;)+) => {
-        words! { Fact "What an expression may ask about the world.": $($fact $spelling = $meaning),+ }
-
-        impl Fact {
-            pub fn ty(self) -> Type {
-                match self { $(Fact::$fact => $ty),+ }
-            }
-
-            pub fn known(self) -> Known {
-                match self { $(Fact::$fact => Known::$known),+ }
-            }
-        }
-    };
-}
+pub(in crate::model) use words;
 
 /// Declares the facts that are one of a list of words.
 macro_rules! word_facts {
@@ -223,86 +209,9 @@ pub const ROAD_USER: (&str, &str) = (
     "The name that a spawn gives to a road user: `each who: RoadUser in [truck, van]`, `order who { … }`.",
 );
 
-const ACCEL: Type = Type::Quantity(Dimension::ACCEL);
-const JERK: Type = Type::Quantity(Dimension::JERK);
-const DURATION: Type = Type::Quantity(Dimension::DURATION);
 const LENGTH: Type = Type::Quantity(Dimension::LENGTH);
 const RATIO: Type = Type::Quantity(Dimension::RATIO);
 const SPEED: Type = Type::Quantity(Dimension::SPEED);
-
-// Policies have variables of their own (`policy::VARIABLES`): what an agent observes is rounded and cut off.
-facts! {
-    RoadLimit "road.limit" SPEED, Road = "A `Speed`: the lowest limit along the route.";
-    EgoSpeed "ego.speed" SPEED, World = "A `Speed`: how fast the ego vehicle is.";
-    EgoAcceleration "ego.acceleration" ACCEL, World = "A `Accel`: of the ego vehicle, negative when it brakes.";
-    EgoLimit "ego.limit" SPEED, World = "A `Speed`: the limit of the lane that the ego vehicle is in.";
-    EgoJunctionAhead "ego.junction_ahead" LENGTH, World = "A `Length`: along the route to the next junction; 0 in one, 1000 m if there is none nearer.";
-    EgoJunctionEnd "ego.junction_end" LENGTH, World = "A `Length`: along the route to the end of that junction; 1000 m if there is none nearer.";
-    EgoCrosswalkAhead "ego.crosswalk_ahead" LENGTH, World = "A `Length`: along the route to the next crosswalk; 0 on one, 1000 m if there is none nearer.";
-    EgoLaneWidth "ego.lane_width" LENGTH, World = "A `Length`: of the route's lane at the ego vehicle.";
-    EgoLightSince "ego.light_since" DURATION, World = "A `Duration`: since when the light of `ego.light` has its colour; 1000 s if there is none.";
-    EgoLightLeft "ego.light_left" DURATION, World = "A `Duration`: until the light of `ego.light` changes; 1000 s if there is none.";
-    EgoRouteLeft "ego.route_left" LENGTH, World = "A `Length`: along the route to the goal.";
-    EgoOffset "ego.offset" LENGTH, World = "A `Length`: how far the ego vehicle is to the left of its route.";
-    EgoFront "ego.front" LENGTH, World = "A `Length`: where the ego vehicle's front is along its route, whose start has 0 m.";
-    EgoRear "ego.rear" LENGTH, World = "A `Length`: where the ego vehicle's rear is along its route.";
-    RoadUsers "road_users" Type::Int, World = "A `Int`: how many there are beside the ego vehicle.";
-    RuleBreakers "rule_breakers" Type::Int, World = "A `Int`: how many of them ignore a rule of the road, as a spawn or a command told them to.";
-    NearestGap "nearest.gap" LENGTH, World = "A `Length`: to the nearest road user; 100 m if there is none.";
-    NearestSpeed "nearest.speed" SPEED, World = "A `Speed`: of the nearest road user; 0 if there is none.";
-    Elapsed "elapsed" DURATION, World = "A `Duration`: since the episode began.";
-    StepNumber "step" Type::Int, World = "A `Int`: the number of the step, from 0.";
-    NpcSpeed "npc.speed" SPEED, Spawn = "A `Speed`: of the road user that appears.";
-    NpcAcceleration "npc.acceleration" ACCEL, Spawn = "A `Accel`: along its heading, negative when it brakes; 0 as it appears.";
-    NpcGap "npc.gap" LENGTH, Spawn = "A `Length`: from the road user that appears to the ego vehicle.";
-    NpcJunctionAhead "npc.junction_ahead" LENGTH, Spawn = "A `Length`: along its way to the next junction; 0 in one, 1000 m if there is none nearer.";
-    NpcCrossingAhead "npc.crossing_ahead" LENGTH, Spawn = "A `Length`: from a vehicle's front to where its way next crosses the ego vehicle's, or joins it; 1000 m if it does not.";
-    NpcEgoCrossingAhead "npc.ego_crossing_ahead" LENGTH, Spawn = "A `Length`: from the ego vehicle's front to that place, below 0 behind it; 1000 m if there is none.";
-    NpcLaneLeft "npc.lane_left" LENGTH, Spawn = "A `Length`: from a vehicle's front to where its lane ends beside others that go on; 1000 m if it does not end sooner.";
-    NpcLightSince "npc.light_since" DURATION, Spawn = "A `Duration`: since when the light of `npc.light` has its colour; 1000 s if there is none.";
-    NpcLightLeft "npc.light_left" DURATION, Spawn = "A `Duration`: until the light of `npc.light` changes; 1000 s if there is none.";
-    NpcLimit "npc.limit" SPEED, Spawn = "A `Speed`: the limit of the lane in which it appears.";
-    NpcFront "npc.front" LENGTH, Spawn = "A `Length`: its end that is farthest along the ego vehicle's route.";
-    NpcRear "npc.rear" LENGTH, Spawn = "A `Length`: its end that is least far along the ego vehicle's route.";
-    NpcOffset "npc.offset" LENGTH, Spawn = "A `Length`: how far its middle is to the left of the ego vehicle's route.";
-    NpcTtc "npc.ttc" DURATION, Spawn = "A `Duration`: until it and the ego vehicle are beside each other at their present speeds; 0 if they are, 100 s if they do not get there sooner.";
-    NpcHeadway "npc.headway" DURATION, Spawn = "A `Duration`: until whichever of it and the ego vehicle is behind, at its present speed, is where the other one is now; 100 s if not sooner.";
-    NpcAlong "npc.along" SPEED, Spawn = "A `Speed`: along the ego vehicle's route, below 0 of one that comes towards it.";
-    NpcAcross "npc.across" SPEED, Spawn = "A `Speed`: to the left across the ego vehicle's route, below 0 to the right.";
-    NpcAside "npc.aside" LENGTH, Spawn = "A `Length`: the room between its outline and the ego vehicle's, across the route; below 0 they overlap.";
-    NpcInLane "npc.in_lane" LENGTH, Spawn = "A `Length`: how far its outline reaches into the ego vehicle's lane beside it; below 0 what is missing.";
-    NpcCrosswalkGap "npc.crosswalk_gap" LENGTH, Spawn = "A `Length`: from its middle to the nearest crosswalk; 0 on one, 100 m if there is none nearer.";
-    NpcNextCrosswalkGap "npc.next_crosswalk_gap" LENGTH, Spawn = "A `Length`: from its middle to the crosswalk that is the next one on the ego vehicle's route, or on which that is; 0 on it, 100 m if there is none or it is farther away.";
-    NpcContactIn "npc.contact_in" DURATION, Spawn = "A `Duration`: until it and the ego vehicle touch, if both go on along and across the route as fast as now; 0 if they touch, 100 s if they do not.";
-    NpcPet "npc.pet" DURATION, Near = "A `Duration`: since the other of the two left the place where one of them is now (post-encroachment time); 100 s if that is more than 5 s ago.";
-    NpcLeads "npc.leads" Type::Bool, Near = "A `Bool`: whether it is the road user that `ego.lead_gap` is about.";
-    NpcLanesLeft "npc.lanes_left" Type::Int, Near = "A `Int`: how many lanes its middle is to the left of the ego vehicle's lane, below 0 to the right; 0 in the same one, 100 if it is in no lane beside the route.";
-    NpcOffRoad "npc.off_road" LENGTH, Near = "A `Length`: from its middle to the nearest driving lane, at most 3 m; below 0 on one.";
-    NpcInNextJunction "npc.in_next_junction" Type::Bool, Spawn = "A `Bool`: whether a vehicle is in the junction that `ego.junction_ahead` is about.";
-    NpcStation "npc.station" LENGTH, Spawn = "A `Length`: where its rear axle, or on foot its middle, is along the trajectory that it follows; 0 if it follows none.";
-    NpcSiren "npc.siren" Type::Bool, Spawn = "A `Bool`: whether it is an emergency vehicle under way, for which all others wait.";
-    SpawnGap "spawn_gap" LENGTH, Spawn = "A `Length`: the gap from the ego vehicle to the road user that appears.";
-    SafetyGap "safety_gap" LENGTH, Spawn = "A `Length`: the gap that a careful driver needs.";
-    EgoLeadGap "ego.lead_gap" LENGTH, Tick = "A `Length`: to the next road user ahead in its way that does not come towards it; 1000 m if there is none nearer.";
-    EgoLeadSpeed "ego.lead_speed" SPEED, Tick = "A `Speed`: of that road user along the route; 0 if there is none.";
-    EgoLeadSince "ego.lead_since" DURATION, Tick = "A `Duration`: since when it has been that one; 0 if there is none.";
-    EgoOverRed "ego.over_red" LENGTH, Tick = "A `Length`: how far its front is beyond the stop line of a light that was red as it passed, until its rear has passed, too; else minus the way to a red light; at least -100 m.";
-    EgoOverStop "ego.over_stop" LENGTH, Tick = "A `Length`: how far its front is beyond the line of a stop sign, until its rear has passed, too; else minus the way to the next one; at least -100 m.";
-    EgoOverLine "ego.over_line" LENGTH, Tick = "A `Length`: how far its front is beyond the stop line of a traffic light, whatever its colour, until its rear has passed, too; else minus the way to the next one; at least -100 m.";
-    EgoOverCrosswalk "ego.over_crosswalk" LENGTH, Tick = "A `Length`: how far its front is beyond the near edge of a crosswalk of its route, until its rear has passed the far one; else minus the way to the next one; at least -100 m.";
-    EgoLaneOffset "ego.lane_offset" LENGTH, Tick = "A `Length`: how far its rear axle is to the left of the middle of its route's lane.";
-    EgoOverOncoming "ego.over_oncoming" LENGTH, Tick = "A `Length`: how far its outline reaches into a lane of the other direction; below 0 the room that is left; -100 m in junctions and where there is no such lane.";
-    EgoOverLane "ego.over_lane" LENGTH, Tick = "A `Length`: how far its outline reaches beyond the lines of its route's lane (of both lanes where the route may change lanes); below 0 the room that is left; -100 m in junctions.";
-    EgoVisibility "ego.visibility" LENGTH, Tick = "A `Length`: how far the fog lets one see; 10 km in clear air.";
-    EgoJerk "ego.jerk" JERK, Tick = "A `Jerk`: the change of the ego vehicle's acceleration over the last second, by that second; 0 in the first one.";
-    EgoLateralAcceleration "ego.lateral_acceleration" ACCEL, Tick = "A `Accel`: of the ego vehicle to its left, negative to its right.";
-    Proc "proc" RATIO, Step = "A `Ratio`: the collision probability of the step.";
-    Collision "collision" Type::Bool, Step = "A `Bool`: the ego vehicle collided.";
-    Repeated "repeated" Type::Bool, Step = "A `Bool`: with an obstacle that it has hit before.";
-    Sudden "sudden" Type::Bool, Step = "A `Bool`: with an obstacle that appeared a moment ago.";
-    Struck "struck" Type::Bool, Step = "A `Bool`: the ego vehicle did not have to give way, and the obstacle ran into its side or rear, or into any part of it while it stood.";
-    Avoidable "avoidable" Type::Bool, Judgement = "A `Bool`: a careful reference driver avoids it. Verdicts only.";
-}
 
 /// What a rule may restrict instead of the draw.
 pub const CHANGE: (&str, &str) = (

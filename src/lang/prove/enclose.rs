@@ -7,9 +7,7 @@ use crate::model::effort;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::vocabulary::{Fact, NearWord, PastWord};
 use crate::model::{
-    AMBIENT_MAX, COMMANDED_MAX, CROSSWALK_GAP_M_MAX, EGO_ACCELERATION_MPS2_MAX, FnDef, Interval,
-    JUNCTION_AHEAD_M_MAX, LEAD_GAP_M_MAX, RoadFacts, SINCE_S_MAX, SPEED_MPS_MAX, TICK_MS, TIME_S_MAX, Type,
-    Value,
+    AMBIENT_MAX, COMMANDED_MAX, FnDef, Interval, RoadFacts, SINCE_S_MAX, TICK_MS, Type, Value,
 };
 use crate::prove::moment::Case;
 use crate::prove::sums::{difference, is_same, lacks_value, may_lack_a_value};
@@ -293,73 +291,10 @@ fn between(low: f64, high: f64) -> Interval {
 
 /// What a fact that is a number may be, on any road and at any moment.
 pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
-    Some(match fact {
-        Fact::EgoSpeed => between(0.0, SPEED_MPS_MAX),
-        Fact::EgoAcceleration => between(-EGO_ACCELERATION_MPS2_MAX, EGO_ACCELERATION_MPS2_MAX),
-        Fact::EgoJunctionAhead
-        | Fact::EgoCrosswalkAhead
-        | Fact::NpcJunctionAhead
-        | Fact::NpcCrossingAhead
-        | Fact::EgoJunctionEnd => between(0.0, JUNCTION_AHEAD_M_MAX),
-        Fact::EgoLightSince | Fact::EgoLightLeft | Fact::NpcLightSince | Fact::NpcLightLeft => {
-            between(0.0, SINCE_S_MAX)
-        }
-        Fact::NpcTtc | Fact::NpcHeadway | Fact::NpcContactIn | Fact::NpcPet => between(0.0, TIME_S_MAX),
-        Fact::EgoOffset
-        | Fact::EgoRouteLeft
-        | Fact::EgoFront
-        | Fact::EgoRear
-        | Fact::NpcFront
-        | Fact::NpcRear
-        | Fact::NpcOffset
-        | Fact::EgoLeadSpeed
-        | Fact::EgoOverRed
-        | Fact::EgoOverStop
-        | Fact::EgoLateralAcceleration
-        | Fact::EgoLaneOffset
-        | Fact::EgoOverCrosswalk
-        | Fact::NpcLanesLeft
-        | Fact::NpcLaneLeft
-        | Fact::NpcOffRoad
-        | Fact::EgoOverLine
-        | Fact::NpcAlong
-        | Fact::NpcAcceleration
-        | Fact::NpcEgoCrossingAhead
-        | Fact::NpcAcross
-        | Fact::NpcAside
-        | Fact::NpcInLane
-        | Fact::EgoOverOncoming
-        | Fact::EgoOverLane
-        | Fact::EgoVisibility
-        | Fact::EgoJerk => Interval::ALL,
-        Fact::NpcCrosswalkGap | Fact::NpcNextCrosswalkGap => between(0.0, CROSSWALK_GAP_M_MAX),
-        Fact::EgoLeadGap => between(0.0, LEAD_GAP_M_MAX),
-        Fact::RoadUsers | Fact::RuleBreakers => between(0.0, f64::from(COMMANDED_MAX + AMBIENT_MAX)),
-        Fact::RoadLimit
-        | Fact::EgoLimit
-        | Fact::EgoLaneWidth
-        | Fact::NearestGap
-        | Fact::NearestSpeed
-        | Fact::Elapsed
-        | Fact::StepNumber
-        | Fact::NpcSpeed
-        | Fact::NpcGap
-        | Fact::NpcLimit
-        | Fact::EgoLeadSince
-        | Fact::NpcStation
-        | Fact::SpawnGap
-        | Fact::SafetyGap => Interval::NOT_NEGATIVE,
-        Fact::Proc => between(0.0, 1.0),
-        Fact::NpcLeads
-        | Fact::NpcInNextJunction
-        | Fact::NpcSiren
-        | Fact::Collision
-        | Fact::Repeated
-        | Fact::Sudden
-        | Fact::Struck
-        | Fact::Avoidable => {
-            return None;
-        }
+    let (low, high) = fact.range().into_inner();
+    (fact.ty() != Type::Bool).then(|| match high == f64::INFINITY && low == 0.0 {
+        true => Interval::NOT_NEGATIVE,
+        false => between(low, high),
     })
 }
 

@@ -1,0 +1,299 @@
+//! The facts: what an expression may ask about the world.
+//!
+//! A row has the spelling of a fact, its type, from when on it is known, where its value stands among what an expression may
+//! read, one sentence for people, and for numbers with bounds what they may be on any road and at any moment.
+
+use core::ops::RangeInclusive;
+
+use crate::model::eval::{
+    CROSSWALK_GAP_M_MAX, Facts, JUNCTION_AHEAD_M_MAX, LEAD_GAP_M_MAX, MomentFacts, SINCE_S_MAX, TIME_S_MAX,
+    TickFacts,
+};
+use crate::model::limits::{AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, SPEED_MPS_MAX};
+use crate::model::value::{Type, Value};
+use crate::model::vocabulary::{Known, Word, words};
+use avastra_base::units::Dimension;
+
+/// What stands where a fact is found.
+trait Told: Copy {
+    /// Where nothing is found.
+    const MISSING: Value = Value::Number(f64::NAN);
+
+    fn value(self) -> Value {
+        Value::Number(self.number())
+    }
+
+    fn number(self) -> f64;
+}
+
+impl Told for f64 {
+    fn number(self) -> f64 {
+        self
+    }
+}
+
+impl Told for u32 {
+    fn number(self) -> f64 {
+        self.into()
+    }
+}
+
+impl Told for i32 {
+    fn number(self) -> f64 {
+        self.into()
+    }
+}
+
+impl Told for u64 {
+    fn number(self) -> f64 {
+        self as f64
+    }
+}
+
+impl Told for bool {
+    const MISSING: Value = Value::Bool(false);
+
+    fn value(self) -> Value {
+        Value::Bool(self)
+    }
+
+    fn number(self) -> f64 {
+        self.into()
+    }
+}
+
+fn told<T: Told>(found: Option<T>) -> Value {
+    found.map_or(T::MISSING, T::value)
+}
+
+/// Where the facts of a kind stand.
+macro_rules! source {
+    ($facts:ident, moment) => {
+        $facts.world.map(|world| &world.moment)
+    };
+    ($facts:ident, tick) => {
+        $facts.world.map(|world| &world.tick)
+    };
+    ($facts:ident, world) => {
+        $facts.world
+    };
+    ($facts:ident, npc) => {
+        $facts.spawn.as_ref().map(|spawn| &spawn.npc)
+    };
+    ($facts:ident, spawn) => {
+        $facts.spawn.as_ref()
+    };
+    ($facts:ident, road) => {
+        $facts.road
+    };
+    ($facts:ident, outcome) => {
+        Some(&$facts.outcome)
+    };
+}
+
+/// A fact of the kind that is asked for, as a function; `None` for others.
+macro_rules! if_of {
+    (moment, moment, $($part:ident).+) => { Some(|moment| Told::number(moment.$($part).+)) };
+    (tick, tick, $($part:ident).+) => { Some(|tick| Told::number(tick.$($part).+)) };
+    ($kind:ident, $other:ident, $($part:ident).+) => { None };
+}
+
+/// What a number may be without bounds.
+macro_rules! range {
+    () => {
+        f64::NEG_INFINITY..=f64::INFINITY
+    };
+    ($range:expr) => {
+        $range
+    };
+}
+
+macro_rules! facts {
+    ($($fact:ident $spelling:literal $ty:expr, $known:ident, $source:ident . $($part:ident).+ =
+       $meaning:literal $(, $range:expr)?;)+) => {
+        words! { Fact "What an expression may ask about the world.": $($fact $spelling = $meaning),+ }
+
+        impl Fact {
+            pub fn ty(self) -> Type {
+                match self { $(Fact::$fact => $ty),+ }
+            }
+
+            pub fn known(self) -> Known {
+                match self { $(Fact::$fact => Known::$known),+ }
+            }
+
+            /// Its value; NaN, or false, where it is not known.
+            pub(crate) fn value(self, facts: &Facts<'_>) -> Value {
+                match self { $(Fact::$fact => told(source!(facts, $source).map(|of| of.$($part).+))),+ }
+            }
+
+            /// What a fact of the moment is; `None` for another one.
+            pub(crate) fn of_moment(self) -> Option<fn(&MomentFacts) -> f64> {
+                match self { $(Fact::$fact => if_of!(moment, $source, $($part).+)),+ }
+            }
+
+            /// What a fact that is watched at every tick is; `None` for another one.
+            pub(crate) fn of_tick(self) -> Option<fn(&TickFacts) -> f64> {
+                match self { $(Fact::$fact => if_of!(tick, $source, $($part).+)),+ }
+            }
+
+            /// What it may be, if it is a number, on any road and at any moment.
+            pub(crate) fn range(self) -> RangeInclusive<f64> {
+                match self { $(Fact::$fact => range!($($range)?)),+ }
+            }
+        }
+    };
+}
+
+const ACCEL: Type = Type::Quantity(Dimension::ACCEL);
+const JERK: Type = Type::Quantity(Dimension::JERK);
+const DURATION: Type = Type::Quantity(Dimension::DURATION);
+const LENGTH: Type = Type::Quantity(Dimension::LENGTH);
+const RATIO: Type = Type::Quantity(Dimension::RATIO);
+const SPEED: Type = Type::Quantity(Dimension::SPEED);
+/// A number that is not negative.
+const FROM_0: RangeInclusive<f64> = 0.0..=f64::INFINITY;
+
+// Policies have variables of their own (`policy::VARIABLES`): what an agent observes is rounded and cut off.
+facts! {
+    RoadLimit "road.limit" SPEED, Road, road.limit_mps =
+        "A `Speed`: the lowest limit along the route.", FROM_0;
+    EgoSpeed "ego.speed" SPEED, World, moment.ego_speed_mps =
+        "A `Speed`: how fast the ego vehicle is.", 0.0..=SPEED_MPS_MAX;
+    EgoAcceleration "ego.acceleration" ACCEL, World, moment.ego_acceleration_mps2 =
+        "A `Accel`: of the ego vehicle, negative when it brakes.", -EGO_ACCELERATION_MPS2_MAX..=EGO_ACCELERATION_MPS2_MAX;
+    EgoLimit "ego.limit" SPEED, World, moment.ego_limit_mps =
+        "A `Speed`: the limit of the lane that the ego vehicle is in.", FROM_0;
+    EgoJunctionAhead "ego.junction_ahead" LENGTH, World, moment.ego_junction_ahead_m =
+        "A `Length`: along the route to the next junction; 0 in one, 1000 m if there is none nearer.", 0.0..=JUNCTION_AHEAD_M_MAX;
+    EgoJunctionEnd "ego.junction_end" LENGTH, World, moment.ego_junction_end_m =
+        "A `Length`: along the route to the end of that junction; 1000 m if there is none nearer.", 0.0..=JUNCTION_AHEAD_M_MAX;
+    EgoCrosswalkAhead "ego.crosswalk_ahead" LENGTH, World, moment.ego_crosswalk_ahead_m =
+        "A `Length`: along the route to the next crosswalk; 0 on one, 1000 m if there is none nearer.", 0.0..=JUNCTION_AHEAD_M_MAX;
+    EgoLaneWidth "ego.lane_width" LENGTH, World, moment.ego_lane_width_m =
+        "A `Length`: of the route's lane at the ego vehicle.", FROM_0;
+    EgoLightSince "ego.light_since" DURATION, World, moment.ego_light_times.since_s =
+        "A `Duration`: since when the light of `ego.light` has its colour; 1000 s if there is none.", 0.0..=SINCE_S_MAX;
+    EgoLightLeft "ego.light_left" DURATION, World, moment.ego_light_times.left_s =
+        "A `Duration`: until the light of `ego.light` changes; 1000 s if there is none.", 0.0..=SINCE_S_MAX;
+    EgoRouteLeft "ego.route_left" LENGTH, World, moment.ego_route_left_m =
+        "A `Length`: along the route to the goal.";
+    EgoOffset "ego.offset" LENGTH, World, moment.ego_offset_m =
+        "A `Length`: how far the ego vehicle is to the left of its route.";
+    EgoFront "ego.front" LENGTH, World, moment.ego_front_m =
+        "A `Length`: where the ego vehicle's front is along its route, whose start has 0 m.";
+    EgoRear "ego.rear" LENGTH, World, moment.ego_rear_m =
+        "A `Length`: where the ego vehicle's rear is along its route.";
+    RoadUsers "road_users" Type::Int, World, moment.road_users =
+        "A `Int`: how many there are beside the ego vehicle.", 0.0..=f64::from(COMMANDED_MAX + AMBIENT_MAX);
+    RuleBreakers "rule_breakers" Type::Int, World, moment.rule_breakers =
+        "A `Int`: how many of them ignore a rule of the road, as a spawn or a command told them to.", 0.0..=f64::from(COMMANDED_MAX + AMBIENT_MAX);
+    NearestGap "nearest.gap" LENGTH, World, moment.nearest_gap_m =
+        "A `Length`: to the nearest road user; 100 m if there is none.", FROM_0;
+    NearestSpeed "nearest.speed" SPEED, World, moment.nearest_speed_mps =
+        "A `Speed`: of the nearest road user; 0 if there is none.", FROM_0;
+    Elapsed "elapsed" DURATION, World, moment.elapsed_s =
+        "A `Duration`: since the episode began.", FROM_0;
+    StepNumber "step" Type::Int, World, world.step =
+        "A `Int`: the number of the step, from 0.", FROM_0;
+    NpcSpeed "npc.speed" SPEED, Spawn, npc.speed_mps =
+        "A `Speed`: of the road user that appears.", FROM_0;
+    NpcAcceleration "npc.acceleration" ACCEL, Spawn, npc.acceleration_mps2 =
+        "A `Accel`: along its heading, negative when it brakes; 0 as it appears.";
+    NpcGap "npc.gap" LENGTH, Spawn, npc.gap_m =
+        "A `Length`: from the road user that appears to the ego vehicle.", FROM_0;
+    NpcJunctionAhead "npc.junction_ahead" LENGTH, Spawn, npc.junction_ahead_m =
+        "A `Length`: along its way to the next junction; 0 in one, 1000 m if there is none nearer.", 0.0..=JUNCTION_AHEAD_M_MAX;
+    NpcCrossingAhead "npc.crossing_ahead" LENGTH, Spawn, npc.crossing_ahead_m =
+        "A `Length`: from a vehicle's front to where its way next crosses the ego vehicle's, or joins it; 1000 m if it does not.", 0.0..=JUNCTION_AHEAD_M_MAX;
+    NpcEgoCrossingAhead "npc.ego_crossing_ahead" LENGTH, Spawn, npc.ego_crossing_ahead_m =
+        "A `Length`: from the ego vehicle's front to that place, below 0 behind it; 1000 m if there is none.";
+    NpcLaneLeft "npc.lane_left" LENGTH, Spawn, npc.lane_left_m =
+        "A `Length`: from a vehicle's front to where its lane ends beside others that go on; 1000 m if it does not end sooner.";
+    NpcLightSince "npc.light_since" DURATION, Spawn, npc.light_times.since_s =
+        "A `Duration`: since when the light of `npc.light` has its colour; 1000 s if there is none.", 0.0..=SINCE_S_MAX;
+    NpcLightLeft "npc.light_left" DURATION, Spawn, npc.light_times.left_s =
+        "A `Duration`: until the light of `npc.light` changes; 1000 s if there is none.", 0.0..=SINCE_S_MAX;
+    NpcLimit "npc.limit" SPEED, Spawn, npc.limit_mps =
+        "A `Speed`: the limit of the lane in which it appears.", FROM_0;
+    NpcFront "npc.front" LENGTH, Spawn, npc.front_m =
+        "A `Length`: its end that is farthest along the ego vehicle's route.";
+    NpcRear "npc.rear" LENGTH, Spawn, npc.rear_m =
+        "A `Length`: its end that is least far along the ego vehicle's route.";
+    NpcOffset "npc.offset" LENGTH, Spawn, npc.offset_m =
+        "A `Length`: how far its middle is to the left of the ego vehicle's route.";
+    NpcTtc "npc.ttc" DURATION, Spawn, npc.ttc_s =
+        "A `Duration`: until it and the ego vehicle are beside each other at their present speeds; 0 if they are, 100 s if they do not get there sooner.", 0.0..=TIME_S_MAX;
+    NpcHeadway "npc.headway" DURATION, Spawn, npc.headway_s =
+        "A `Duration`: until whichever of it and the ego vehicle is behind, at its present speed, is where the other one is now; 100 s if not sooner.", 0.0..=TIME_S_MAX;
+    NpcAlong "npc.along" SPEED, Spawn, npc.along_mps =
+        "A `Speed`: along the ego vehicle's route, below 0 of one that comes towards it.";
+    NpcAcross "npc.across" SPEED, Spawn, npc.across_mps =
+        "A `Speed`: to the left across the ego vehicle's route, below 0 to the right.";
+    NpcAside "npc.aside" LENGTH, Spawn, npc.aside_m =
+        "A `Length`: the room between its outline and the ego vehicle's, across the route; below 0 they overlap.";
+    NpcInLane "npc.in_lane" LENGTH, Spawn, npc.in_lane_m =
+        "A `Length`: how far its outline reaches into the ego vehicle's lane beside it; below 0 what is missing.";
+    NpcCrosswalkGap "npc.crosswalk_gap" LENGTH, Spawn, npc.crosswalk_gap_m =
+        "A `Length`: from its middle to the nearest crosswalk; 0 on one, 100 m if there is none nearer.", 0.0..=CROSSWALK_GAP_M_MAX;
+    NpcNextCrosswalkGap "npc.next_crosswalk_gap" LENGTH, Spawn, npc.next_crosswalk_gap_m =
+        "A `Length`: from its middle to the crosswalk that is the next one on the ego vehicle's route, or on which that is; 0 on it, 100 m if there is none or it is farther away.", 0.0..=CROSSWALK_GAP_M_MAX;
+    NpcContactIn "npc.contact_in" DURATION, Spawn, npc.contact_in_s =
+        "A `Duration`: until it and the ego vehicle touch, if both go on along and across the route as fast as now; 0 if they touch, 100 s if they do not.", 0.0..=TIME_S_MAX;
+    NpcPet "npc.pet" DURATION, Near, npc.pet_s =
+        "A `Duration`: since the other of the two left the place where one of them is now (post-encroachment time); 100 s if that is more than 5 s ago.", 0.0..=TIME_S_MAX;
+    NpcLeads "npc.leads" Type::Bool, Near, npc.leads =
+        "A `Bool`: whether it is the road user that `ego.lead_gap` is about.";
+    NpcLanesLeft "npc.lanes_left" Type::Int, Near, npc.lanes_left =
+        "A `Int`: how many lanes its middle is to the left of the ego vehicle's lane, below 0 to the right; 0 in the same one, 100 if it is in no lane beside the route.";
+    NpcOffRoad "npc.off_road" LENGTH, Near, npc.off_road_m =
+        "A `Length`: from its middle to the nearest driving lane, at most 3 m; below 0 on one.";
+    NpcInNextJunction "npc.in_next_junction" Type::Bool, Spawn, npc.in_next_junction =
+        "A `Bool`: whether a vehicle is in the junction that `ego.junction_ahead` is about.";
+    NpcStation "npc.station" LENGTH, Spawn, npc.station_m =
+        "A `Length`: where its rear axle, or on foot its middle, is along the trajectory that it follows; 0 if it follows none.", FROM_0;
+    NpcSiren "npc.siren" Type::Bool, Spawn, npc.has_siren =
+        "A `Bool`: whether it is an emergency vehicle under way, for which all others wait.";
+    SpawnGap "spawn_gap" LENGTH, Spawn, spawn.spawn_gap_m =
+        "A `Length`: the gap from the ego vehicle to the road user that appears.", FROM_0;
+    SafetyGap "safety_gap" LENGTH, Spawn, spawn.safety_gap_m =
+        "A `Length`: the gap that a careful driver needs.", FROM_0;
+    EgoLeadGap "ego.lead_gap" LENGTH, Tick, tick.lead_gap_m =
+        "A `Length`: to the next road user ahead in its way that does not come towards it; 1000 m if there is none nearer.", 0.0..=LEAD_GAP_M_MAX;
+    EgoLeadSpeed "ego.lead_speed" SPEED, Tick, tick.lead_speed_mps =
+        "A `Speed`: of that road user along the route; 0 if there is none.";
+    EgoLeadSince "ego.lead_since" DURATION, Tick, tick.lead_since_s =
+        "A `Duration`: since when it has been that one; 0 if there is none.", FROM_0;
+    EgoOverRed "ego.over_red" LENGTH, Tick, tick.over_red_m =
+        "A `Length`: how far its front is beyond the stop line of a light that was red as it passed, until its rear has passed, too; else minus the way to a red light; at least -100 m.";
+    EgoOverStop "ego.over_stop" LENGTH, Tick, tick.over_stop_m =
+        "A `Length`: how far its front is beyond the line of a stop sign, until its rear has passed, too; else minus the way to the next one; at least -100 m.";
+    EgoOverLine "ego.over_line" LENGTH, Tick, tick.over_line_m =
+        "A `Length`: how far its front is beyond the stop line of a traffic light, whatever its colour, until its rear has passed, too; else minus the way to the next one; at least -100 m.";
+    EgoOverCrosswalk "ego.over_crosswalk" LENGTH, Tick, tick.over_crosswalk_m =
+        "A `Length`: how far its front is beyond the near edge of a crosswalk of its route, until its rear has passed the far one; else minus the way to the next one; at least -100 m.";
+    EgoLaneOffset "ego.lane_offset" LENGTH, Tick, tick.lane_offset_m =
+        "A `Length`: how far its rear axle is to the left of the middle of its route's lane.";
+    EgoOverOncoming "ego.over_oncoming" LENGTH, Tick, tick.over_oncoming_m =
+        "A `Length`: how far its outline reaches into a lane of the other direction; below 0 the room that is left; -100 m in junctions and where there is no such lane.";
+    EgoOverLane "ego.over_lane" LENGTH, Tick, tick.over_lane_m =
+        "A `Length`: how far its outline reaches beyond the lines of its route's lane (of both lanes where the route may change lanes); below 0 the room that is left; -100 m in junctions.";
+    EgoVisibility "ego.visibility" LENGTH, Tick, tick.visibility_m =
+        "A `Length`: how far the fog lets one see; 10 km in clear air.";
+    EgoJerk "ego.jerk" JERK, Tick, tick.jerk_mps3 =
+        "A `Jerk`: the change of the ego vehicle's acceleration over the last second, by that second; 0 in the first one.";
+    EgoLateralAcceleration "ego.lateral_acceleration" ACCEL, Tick, tick.lateral_mps2 =
+        "A `Accel`: of the ego vehicle to its left, negative to its right.";
+    Proc "proc" RATIO, Step, outcome.proc =
+        "A `Ratio`: the collision probability of the step.", 0.0..=1.0;
+    Collision "collision" Type::Bool, Step, outcome.collision =
+        "A `Bool`: the ego vehicle collided.";
+    Repeated "repeated" Type::Bool, Step, outcome.repeated =
+        "A `Bool`: with an obstacle that it has hit before.";
+    Sudden "sudden" Type::Bool, Step, outcome.sudden =
+        "A `Bool`: with an obstacle that appeared a moment ago.";
+    Struck "struck" Type::Bool, Step, outcome.struck =
+        "A `Bool`: the ego vehicle did not have to give way, and the obstacle ran into its side or rear, or into any part of it while it stood.";
+    Avoidable "avoidable" Type::Bool, Judgement, outcome.avoidable =
+        "A `Bool`: a careful reference driver avoids it. Verdicts only.";
+}
