@@ -7,7 +7,7 @@
     observation, info = env.reset(seed=1)
     observation, reward, terminated, truncated, info = env.step(env.action_space.sample(info["action_mask"].astype("int8")))
 
-Needs `gymnasium>=1.1,<2`: `pip install './python[gym]'`.
+Needs `gymnasium>=1.2.2,<2`: `pip install './python[gym]'`.
 
 - An **action** is a row of the action table. An illegal one loses its step: nothing happens in it but driving, and
   `info["refused"]` says which rule forbids it. So learners without masks work, and learn what illegal rows are worth:
@@ -174,7 +174,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
         self.rows = compiled.rows
         self.render_mode = None
         self.threads = threads or os.cpu_count() or 1
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.autoreset_mode = _mode(autoreset_mode)
         self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
         self._is_masked = _is_masked(mask)
         self.single_action_space = spaces.Discrete(first[0].rows)
@@ -200,9 +200,12 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
 
         Raises:
             EpisodeError: An external driving system failed as an episode began.
-            ValueError: Seeds or mask do not fit the number of worlds.
+            ValueError: Seeds or mask do not fit the number of worlds, or there is another option.
         """
         which = np.ones(self.num_envs, dtype=bool)
+        for option in options or {}:
+            if option != "reset_mask":
+                raise ValueError(f"no option `{option}`: `reset` takes `seed` and the option `reset_mask`")
         if options and "reset_mask" in options:
             which = np.asarray(options["reset_mask"], dtype=bool)
             if which.shape != (self.num_envs,) or not which.any():
@@ -310,6 +313,11 @@ def _compiled(space: "Union[str, os.PathLike[str], Space]") -> Space:
 def _episodes(space: Space, road: Optional[str], observation: _Seen, reward: _Reward,
               conditions: Dict[str, Any]) -> Episodes:
     return Episodes(space, road or space.roads[0], observation=observation, reward=reward, **conditions)
+
+
+def _mode(mode: Union[str, AutoresetMode]) -> AutoresetMode:
+    """A mode by its name here and in the documents of Gymnasium, or by its value."""
+    return AutoresetMode[mode] if isinstance(mode, str) and mode in AutoresetMode.__members__ else AutoresetMode(mode)
 
 
 def _is_masked(mask: str) -> bool:

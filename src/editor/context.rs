@@ -521,13 +521,13 @@ impl<'a> Place<'a> {
                 let is_named = self.references.declaration(&Symbol::RoadUser(name.to_owned())).is_some()
                     || self.locals.iter().any(|(local, ty)| local == name && self.is_road_user(*ty));
                 // Some facts are for requirements alone.
-                let is_here = |part: &str| {
+                let is_known = |part: &str| {
                     let fact = Fact::from_name(&format!("{name}.{part}"));
                     matches!(self.about, About::Facts(site) if site.is_requirement())
                         || fact.is_none_or(|fact| !matches!(fact.known(), Known::Tick | Known::Near))
                 };
                 let parts = match things().contains(&name) {
-                    true => parts_of(name).into_iter().filter(|(part, _)| is_here(part)).collect(),
+                    true => parts_of(name).into_iter().filter(|(part, _)| is_known(part)).collect(),
                     false if is_named => parts_of_named().into_iter().chain([THERE]).collect(),
                     false if self.declared(Symbol::Requirement, name).is_some() => match self.about {
                         About::Facts(Site::Reward) => vec![BREACHED, MARGIN],

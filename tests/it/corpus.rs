@@ -9,7 +9,7 @@ use avastra::check::{Loaded, MapCache, ReadError, differences, load, load_with};
 use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, Severity, apply_fixes};
 
-use crate::cases::{cases, each_case, root};
+use crate::cases::{cases, each_case, files, root, stem};
 use crate::command::{avastra, done, done_in, outcome};
 
 /// Loads a case, with `text` in place of the file's own text if there is one.
@@ -91,6 +91,17 @@ fn every_message_is_worded_for_authors() {
 /// Whether the words are not ours: a code point, or what the system says.
 fn is_a_name(text: &str) -> bool {
     text.starts_with("U+") || text.contains("(os error ")
+}
+
+/// A case that is renamed or gone takes its expectation with it.
+#[test]
+fn every_expectation_of_a_case_has_its_case() {
+    for area in ["diagnostics", "format", "imports", "missing_use", "wishes"] {
+        let cases: Vec<String> = cases(area).into_iter().map(|(stem, _)| stem).collect();
+        let kept = files(root().join("snapshots").join(area), "snap");
+        let kept: Vec<String> = kept.iter().map(|path| stem(path)).collect();
+        assert_eq!(kept, cases, "snapshots/{area} beside tests/cases/{area}");
+    }
 }
 
 /// If a file nearby declares an unknown name, the diagnostic says which `use` is missing.

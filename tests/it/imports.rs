@@ -7,24 +7,11 @@ use avastra::import::{Files, Imported, Refusal, Request, VARIATIONS_USUAL, opens
 use avastra::rng;
 use avastra::rng::Stream;
 
-use crate::cases::{expect_snapshot, root, stem};
+use crate::cases::{cases, expect_snapshot, root, stem, try_each};
 use crate::command::{avastra, done, outcome};
 use crate::exports::crash;
 
 const AREA: &str = "tests/cases/imports";
-
-const FILES: [&str; 10] = [
-    "cut_in",
-    "walker",
-    "refused",
-    "braking",
-    "crossing",
-    "crossing_speeds",
-    "profile",
-    "kept",
-    "changing",
-    "beside",
-];
 
 /// Files of variations, and how many rows they make: of the last one, a parameter is drawn in each.
 const ROWS: [(&str, usize); 3] = [("crossing_speeds", 12), ("crossing_drawn", 12), ("profile_values", 726)];
@@ -34,7 +21,7 @@ const WET: &str = "tests/cases/exports/wet_corner.ava";
 
 #[test]
 fn every_file_becomes_a_space_or_is_refused_with_its_lines() {
-    for name in FILES.into_iter().chain(["profile_values", "crossing_drawn"]) {
+    try_each("imports", |name, _| {
         let scratch = tempfile::tempdir().expect("a scratch directory");
         let folder = scratch.path().display().to_string();
         let file = format!("{AREA}/{name}.xosc");
@@ -46,7 +33,7 @@ fn every_file_becomes_a_space_or_is_refused_with_its_lines() {
         assert_eq!(written.exists(), is_imported, "{name}");
         if !is_imported {
             expect_snapshot("imports", name, &stdout);
-            continue;
+            return;
         }
         let text = std::fs::read_to_string(&written).expect("it was written");
         expect_snapshot("imports", name, &text);
@@ -59,7 +46,7 @@ fn every_file_becomes_a_space_or_is_refused_with_its_lines() {
             let table = done(&["table", &file]);
             let last = table.lines().last().and_then(|line| line.split_whitespace().next());
             assert_eq!(last, Some((rows - 1).to_string().as_str()), "{name}");
-            continue;
+            return;
         }
         let scenario = scratch.path().join(format!("{name}_scenario.ava"));
         let text = std::fs::read_to_string(&scenario).expect("it was written");
@@ -80,7 +67,7 @@ fn every_file_becomes_a_space_or_is_refused_with_its_lines() {
             _ => 30.0,
         };
         assert!((ego_kmh - wanted_kmh).abs() < 0.1, "{name}: the ego vehicle begins at {ego_kmh} km/h");
-    }
+    });
 }
 
 /// Exports of every kind carry the scenario, and its claims if it has some.
@@ -906,11 +893,11 @@ fn no_torn_or_altered_file_makes_it_panic() {
     let files = Kept::with("corner");
     let mut rng = rng::stream(18, Stream::Reset, 0);
     let (mut imported, mut refused) = (0, 0);
-    for name in FILES {
+    for (name, _) in cases("imports") {
         // The corner's map is small: its lane 1/-1 stands for the boulevard's 3/-2.
         let text = read(&format!("{AREA}/{name}.xosc"))
             .replace("roadId=\"3\" laneId=\"-2\"", "roadId=\"1\" laneId=\"-1\"");
-        let mut try_one = |text: &str| match import(text, name, &files) {
+        let mut try_one = |text: &str| match import(text, &name, &files) {
             Ok(_) => imported += 1,
             Err(refusals) => {
                 assert!(!refusals.is_empty(), "a refusal has a reason");

@@ -1,4 +1,5 @@
-//! The order of the modules inside each crate: each may use only those to its left. Between crates the compiler keeps it.
+//! What the text of the sources shows: each module of a crate uses only those to its left (between crates the compiler keeps
+//! that), one file alone names parry2d, `cli` alone touches files and the environment, and `campaign/files` alone writes.
 
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,11 @@
 // The page's modules without a browser: `node --test tests/page`. `tests/interop/report.sh` opens whole pages in one.
 import assert from "node:assert/strict";
+import { readFileSync, readdirSync } from "node:fs";
 import { test } from "node:test";
+import { Script } from "node:vm";
 import { deflateSync } from "node:zlib";
 
+import { TimeAxis } from "../../src/exchange/report/page/axis.js";
 import { Clock, RATES } from "../../src/exchange/report/page/clock.js";
 import { unpackedText } from "../../src/exchange/report/page/decode.js";
 import { byName, linkOf, linkToList, linked, relink } from "../../src/exchange/report/page/link.js";
@@ -52,6 +55,9 @@ test("a clock that is stopped and started within a frame plays once", () => {
   const clock = new Clock(10, 0.02, () => {});
   clock.play();
   clock.pause();
+  clock.play();
+  clock.stop();
+  assert.deepEqual([clock.playing, due.size], [false, 0]);
   clock.play();
   assert.equal(due.size, 1);
   pass(1000);
@@ -196,4 +202,58 @@ test("a scenario is found by its file, or by the end of it", () => {
   assert.equal(byName(scenarios, "two"), scenarios[2], "the whole name first");
   assert.equal(byName(scenarios, "three"), null);
   assert.equal(byName(scenarios, ""), null);
+});
+
+test("times and places on an axis are each other's inverse", () => {
+  const axis = new TimeAxis(20, 484, 74, 10);
+  assert.deepEqual([axis.xOf(0), axis.xOf(20), axis.timeAt(74), axis.timeAt(474)], [74, 474, 0, 20]);
+  for (const timeS of [0.02, 7, 19.98]) assert.ok(Math.abs(axis.timeAt(axis.xOf(timeS)) - timeS) < 1e-9);
+  assert.deepEqual([axis.timeAt(-5), axis.timeAt(999)], [0, 20], "beside it are its ends");
+});
+
+test("labels of an axis have room", () => {
+  for (const endS of [0.5, 3, 12, 60, 600]) {
+    for (const width of [300, 1200]) {
+      const axis = new TimeAxis(endS, width, 74, 10);
+      const labels = axis.labels();
+      assert.equal(labels[0], 0);
+      assert.ok(labels.every((timeS) => timeS <= endS));
+      const places = labels.map((timeS) => axis.xOf(timeS));
+      assert.ok(places.slice(1).every((x, i) => x - places[i] > 46));
+    }
+  }
+});
+
+/** The modules in the order in which `page.rs` joins them. */
+function modules() {
+  const rust = readFileSync(new URL("../../src/exchange/report/page.rs", import.meta.url), "utf8");
+  const names = [...rust.matchAll(/include_str!\("page\/(\w+\.js)"\)/g)].map(([, name]) => name);
+  const folder = new URL("../../src/exchange/report/page/", import.meta.url);
+  assert.deepEqual([...names].sort(), readdirSync(folder).filter((name) => name.endsWith(".js")).sort());
+  return names.map((name) => [name, readFileSync(new URL(name, folder), "utf8")]);
+}
+
+test("joined, the modules are one script in which each name stands once", () => {
+  const owners = new Map();
+  let script = '"use strict";\n';
+  for (const [name, text] of modules()) {
+    for (const [, declared] of text.matchAll(/^(?:export )?(?:async )?(?:function|class|const|let) (\w+)/gm)) {
+      assert.equal(owners.get(declared), undefined, `${declared} stands in ${owners.get(declared)} and in ${name}`);
+      owners.set(declared, name);
+    }
+    assert.doesNotMatch(text, /^export (default|\{|\*)/m, `${name}: only declarations are exported`);
+    assert.doesNotMatch(text, /^import (?!(\{[^}]*\}|\w+) from ")/m, `${name}: only names are imported`);
+    assert.doesNotMatch(text, /^import \{[^}]*\bas\b/m, `${name}: a name has one spelling`);
+    script += text.replace(/^import [^;]*;$/gm, "").replace(/^export /gm, "");
+  }
+  new Script(`(() => {\n${script}})();\n`);
+});
+
+test("what a module imports stands before it", () => {
+  const order = modules().map(([name]) => name);
+  for (const [name, text] of modules()) {
+    for (const [, from] of text.matchAll(/^import [^;]*from "\.\/(\w+\.js)";$/gm)) {
+      assert.ok(order.indexOf(from) < order.indexOf(name), `${name} imports ${from}, which stands behind it`);
+    }
+  }
 });

@@ -181,6 +181,13 @@ class ManyWorlds(unittest.TestCase):
 
         self.assertEqual(seeds(True), seeds(False))
 
+    def test_modes_have_names_and_options_are_known(self):
+        for mode in AutoresetMode:
+            for name in (mode, mode.name, mode.value):
+                self.assertEqual(avastra.gym.VectorEnv(1, SPACE, "crossroad", autoreset_mode=name).autoreset_mode, mode)
+        with self.assertRaisesRegex(ValueError, "no option `reset_masks`"):
+            avastra.gym.VectorEnv(1, SPACE, "crossroad").reset(options={"reset_masks": [True]})
+
     def test_a_driving_system_that_fails_at_once(self):
         with tempfile.TemporaryDirectory() as folder:
             conditions = {"ads_config": failing_profile(folder)}

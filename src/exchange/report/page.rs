@@ -28,6 +28,7 @@ const MODULES: &[&str] = &[
     include_str!("page/ground.js"),
     include_str!("page/bodies.js"),
     include_str!("page/view.js"),
+    include_str!("page/axis.js"),
     include_str!("page/plots.js"),
     include_str!("page/strip.js"),
     include_str!("page/source.js"),

@@ -269,7 +269,7 @@ pub fn opening_words(rule: Rule) -> Vec<&'static str> {
 }
 
 /// Whether the rule is a mark or keyword that the tree does not keep, because the rule around it tells
-/// which one it was. Rules are ordered as they stand in the grammar.
+/// which one it was. Rules are ordered as they stand in the grammar, where marks and keywords stand together; a test keeps that.
 pub fn is_plain_terminal(rule: Rule) -> bool {
     let is_kept = matches!(
         rule,
@@ -283,4 +283,34 @@ pub fn is_plain_terminal(rule: Rule) -> bool {
             | Rule::kw_by
     );
     rule == Rule::EOI || (Rule::colon..=Rule::kw_lane).contains(&rule) && !is_kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_and_keywords_stand_together_in_the_grammar() {
+        let marks = [
+            "colon",
+            "comma",
+            "equals",
+            "arrow",
+            "fat_arrow",
+            "bar",
+            "less",
+            "slash",
+            "open_brace",
+            "close_brace",
+            "open_paren",
+            "close_paren",
+            "open_bracket",
+            "close_bracket",
+        ];
+        for rule in Rule::all_rules() {
+            let name = format!("{rule:?}");
+            let is_terminal = name.starts_with("kw_") || marks.contains(&name.as_str());
+            assert_eq!((Rule::colon..=Rule::kw_lane).contains(rule), is_terminal, "{name}");
+        }
+    }
 }

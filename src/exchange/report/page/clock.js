@@ -3,8 +3,11 @@
 export const RATES = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 
 export class Clock {
-  /** The frame that is due while it plays. */
-  #frame = 0;
+  /**
+   * The frame that is due while it plays, and `null` while it does not.
+   * @type {number | null}
+   */
+  #frame = null;
 
   /**
    * @param {number} endS
@@ -17,7 +20,10 @@ export class Clock {
     this.changed = changed;
     this.timeS = 0;
     this.rate = 1;
-    this.playing = false;
+  }
+
+  get playing() {
+    return this.#frame !== null;
   }
 
   /** @param {number} timeS */
@@ -40,24 +46,22 @@ export class Clock {
   play() {
     if (this.playing) return;
     if (this.timeS >= this.endS - 1e-6) this.timeS = 0;
-    this.playing = true;
     let before = performance.now();
     const frame = (/** @type {number} */ now) => {
       const next = this.timeS + ((now - before) / 1000) * this.rate;
       before = now;
-      if (next >= this.endS) this.pause();
+      if (next >= this.endS) this.stop();
+      else this.#frame = requestAnimationFrame(frame);
       this.seek(next);
-      if (this.playing) this.#frame = requestAnimationFrame(frame);
     };
     this.#frame = requestAnimationFrame(frame);
     this.changed(this.timeS);
   }
 
-  /** Ends it without a word. */
+  /** Ends it without a word: a frame that is due would play on beside the next one. */
   stop() {
-    this.playing = false;
-    // A frame that is due would play on beside the next one.
-    cancelAnimationFrame(this.#frame);
+    if (this.#frame !== null) cancelAnimationFrame(this.#frame);
+    this.#frame = null;
   }
 
   pause() {

@@ -20,7 +20,7 @@ export class Controls {
       value: 0,
       "aria-label": "Time in s",
       oninput: (event) => {
-        clock.playing = false;
+        clock.stop();
         clock.seek(Number(event.target.value));
       },
     });

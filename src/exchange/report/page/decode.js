@@ -67,10 +67,18 @@ function restored(values, order, step) {
 }
 
 /**
+ * What an element of the page holds.
+ * @param {string} id
+ */
+function textOf(id) {
+  return document.getElementById(id)?.textContent ?? "";
+}
+
+/**
  * The header and the columns of an element's data.
  * @param {string} id
  */
-export const unpacked = (id) => unpackedText(document.getElementById(id).textContent.trim());
+export const unpacked = (id) => unpackedText(textOf(id).trim());
 
 /**
  * The same of a text.
@@ -98,6 +106,7 @@ let known = null;
  * @returns {Index}
  */
 export function index() {
-  known ??= JSON.parse(document.getElementById("index").textContent);
-  return known;
+  const read = known ?? JSON.parse(textOf("index"));
+  known = read;
+  return read;
 }

@@ -48,7 +48,7 @@ export function key(event, watch) {
     Home: () => clock.seek(0),
     End: () => clock.seek(clock.endS),
     c: () => watch.toCollision(),
-    f: () => document.getElementById("follow").click(),
+    f: () => document.getElementById("follow")?.click(),
     "-": () => watch.zoom(1 / ZOOM),
     "+": () => watch.zoom(ZOOM),
     "[": () => clock.faster(-1),

@@ -17,7 +17,7 @@ export function linked() {
 export function relink(changes, step = false) {
   const parts = { ...linked(), ...changes };
   const kept = Object.entries(parts).filter(([, value]) => value !== null && value !== undefined && value !== "");
-  const hash = linkOf(Object.fromEntries(kept));
+  const hash = linkOf(/** @type {Record<string, string>} */ (Object.fromEntries(kept)));
   if (hash === location.hash) return;
   if (step) location.hash = hash;
   else history.replaceState(null, "", hash || "#");
@@ -51,7 +51,7 @@ export const nameOf = (entry) => entry.file.replace(/\.ava$/, "");
 /**
  * The scenario of that name, or of a file that ends with it; `null` if there is none.
  * @param {Entry[]} scenarios
- * @param {string} name
+ * @param {string | null | undefined} name
  */
 export function byName(scenarios, name) {
   if (!name) return null;

@@ -7,7 +7,8 @@ import { key, showKeys } from "./keys.js";
 import { closeWatch, opened, showWatch } from "./watch.js";
 
 const data = index();
-const main = document.getElementById("main");
+const main = /** @type {HTMLElement} */ (document.getElementById("main"));
+/** @type {string | null} */
 let shown = null;
 
 /** Shows what the link asks for. */

@@ -11,12 +11,9 @@ const recordings = new Map();
  * @param {string} id
  */
 export function recording(id) {
-  if (!recordings.has(id))
-    recordings.set(
-      id,
-      unpacked(id).then((data) => new Recording(data, index().quantisation)),
-    );
-  return recordings.get(id);
+  const known = recordings.get(id) ?? unpacked(id).then((data) => new Recording(data, index().quantisation));
+  recordings.set(id, known);
+  return known;
 }
 
 export class Recording {
@@ -208,6 +205,7 @@ export class Recording {
    * @param {number} at
    */
   latest(list, at) {
+    /** @type {[number, T] | null} */
     let found = null;
     for (const entry of list) {
       if (entry[0] > at + 1e-6) break;

@@ -9,7 +9,14 @@ import { linkOf, nameOf } from "./link.js";
 import { study } from "./study.js";
 import { CHANGES, driverInWords, figure, mainCollision, plural, simulated } from "./words.js";
 
-/** Fills an element with the overview; `missing` is what the link names and the page has not. */
+/** @import { Index } from "./data" */
+
+/**
+ * Fills an element with the overview.
+ * @param {HTMLElement} place
+ * @param {Index} data
+ * @param {string | null} missing what the link names and the page has not
+ */
 export function showOverview(place, data, missing = null) {
   const { overview, scenarios } = data;
   const list = el("div", { id: "scenarios" });

@@ -38,10 +38,24 @@ export function palette() {
   );
 }
 
+/**
+ * What draws on an element.
+ * @param {HTMLCanvasElement} element
+ */
+export function contextOf(element) {
+  const context = element.getContext("2d");
+  if (!context) throw new Error("this browser does not draw");
+  return context;
+}
+
 export class Canvas {
+  /** @param {HTMLCanvasElement} element */
   constructor(element) {
     this.element = element;
-    this.context = element.getContext("2d");
+    this.context = contextOf(element);
+    this.width = 0;
+    this.height = 0;
+    this.ratio = 1;
     this.camera = { x: 0, y: 0, pxPerM: 6, turn: 0 };
     this.colours = palette();
   }

@@ -46,7 +46,13 @@ export async function showWatch(place, data, entry) {
   return true;
 }
 
-/** What is shown beside: the other driving system's drive, which is there at first, or another scenario. */
+/**
+ * What is shown beside: the other driving system's drive, which is there at first, or another scenario.
+ * @param {Index} data
+ * @param {Entry} entry
+ * @param {string | undefined} wanted
+ * @returns {Promise<{ recording: Recording, road: any, name: string } | null>}
+ */
 async function other(data, entry, wanted) {
   if ((wanted ?? COMPARED) === COMPARED && entry.compared) {
     const [recorded, road] = await Promise.all([recording(`c${entry.n}`), ground(entry.ground)]);
@@ -59,6 +65,26 @@ async function other(data, entry, wanted) {
 }
 
 class Watch {
+  // What it is made of, once it is built.
+  /** @type {Controls} */
+  controls;
+  /** @type {Plots} */
+  plots;
+  /** @type {View[]} */
+  views;
+  /** @type {HTMLElement} */
+  users;
+  /** @type {ResizeObserver} */
+  resize;
+  /** @type {(recording: Recording, timeS: number) => void} */
+  showMoment;
+  /** @type {(step: number) => void} */
+  markStep;
+  /** @type {(step: number) => void} */
+  markSource;
+  /** @type {() => void} */
+  drawStills;
+
   /**
    * @param {HTMLElement} place
    * @param {Index} data

@@ -138,7 +138,8 @@ export const PROC = "collision probability: how near the ego vehicle is to a cra
  */
 export function changeInWords({ kind, later_s: laterS }) {
   if (kind !== "other_time") return CHANGES[kind] ?? kind;
-  return `same crash, ${figure(Math.abs(laterS), "s", 2)} ${laterS > 0 ? "later" : "earlier"}`;
+  const movedS = laterS ?? 0;
+  return `same crash, ${figure(Math.abs(movedS), "s", 2)} ${movedS > 0 ? "later" : "earlier"}`;
 }
 
 /** A cause in words. */

@@ -9,7 +9,7 @@ use crate::agent::trajectory::Experience;
 use crate::agent::{Rows, Settings, by_name};
 use avastra_base::rng::{Stream, stream};
 
-use super::update::{loss, targets};
+use super::update::{loss, shorten, targets};
 use super::*;
 
 /// Plain settings for problems of a few states; each test changes what it is about.
@@ -281,4 +281,28 @@ fn double_q_learning_overestimates_less() {
     let (plain, double) = (mean(false), mean(true));
     assert!(plain > 0.2, "DQN should overestimate a value of 0: {plain}");
     assert!(double < 0.7 * plain, "DDQN {double}, DQN {plain}");
+}
+
+#[test]
+fn a_long_gradient_is_shortened_and_a_short_one_is_not() {
+    let mut long = [3.0, 4.0];
+    shorten(&mut long, 1.0);
+    assert!(long.iter().zip([0.6, 0.8]).all(|(found, wanted): (&f32, f32)| (found - wanted).abs() < 1e-5));
+    let mut short = [0.3, 0.4];
+    shorten(&mut short, 1.0);
+    assert_eq!(short, [0.3, 0.4]);
+}
+
+#[test]
+fn the_target_is_renewed_after_so_many_updates() {
+    let mut learner =
+        learner(small("updates_per_step: 1\nlearning_starts: 1\ntarget_period_updates: 3"), 4, 5);
+    let first = learner.target.parameters().to_vec();
+    for number in 1..=6_u32 {
+        let one = ended(vec![experience(0, 1, 1.0, 4)], 9, 4);
+        learner.learn(&one, &mut stream(u64::from(number), Stream::Replay, 0)).unwrap();
+        let is_renewed = learner.target.parameters() == learner.policy.network.parameters();
+        assert_eq!(is_renewed, number % 3 == 0, "after {number}");
+        assert_eq!(learner.target.parameters() == first, number < 3, "after {number}");
+    }
 }

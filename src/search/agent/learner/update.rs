@@ -112,7 +112,7 @@ fn placed(batch: &[&Transition], slopes: &[f32], shape: (usize, usize)) -> Array
 }
 
 /// Scales a gradient down to a length.
-fn shorten(gradient: &mut [f32], norm_max: f64) {
+pub(super) fn shorten(gradient: &mut [f32], norm_max: f64) {
     let squares: f64 = gradient.iter().map(|&slope| f64::from(slope) * f64::from(slope)).sum();
     let share = norm_max / (libm::sqrt(squares) + 1e-6);
     if share < 1.0 {

@@ -101,25 +101,23 @@ impl Replay {
     }
 
     /// A buffer as it was saved, of transitions with so many inputs and rows; `None` if it has no room for them, the bytes end
-    /// too soon, or a priority is none.
+    /// too soon, or a priority or a row is none.
     pub(in crate::agent) fn restored(
         settings: ReplaySettings,
         (inputs, rows): (usize, usize),
         bytes: &mut Reader<'_>,
     ) -> Option<Replay> {
         let (count, next) = (bytes.u64()?, bytes.u64()?);
-        let priority_max = bytes.f64s(1)?[0];
+        let is_priority = |value: &f64| *value >= 0.0 && value.is_finite();
+        let priority_max = Some(bytes.f64s(1)?[0]).filter(is_priority)?;
         let is_place = |next: &usize| *next < settings.replay_capacity;
         let next = usize::try_from(next).ok().filter(is_place)?;
         let count = usize::try_from(count).ok().filter(|count| *count <= settings.replay_capacity)?;
         let mut replay = Replay { next, priority_max, ..Replay::new(settings) };
         for index in 0..count {
-            let priority = bytes.f64s(1)?[0];
-            if !(priority >= 0.0 && priority.is_finite()) {
-                return None;
-            }
+            let priority = Some(bytes.f64s(1)?[0]).filter(is_priority)?;
             let sight = bytes.f32s(inputs)?;
-            let row = u32::try_from(bytes.u64()?).ok()?;
+            let row = u32::try_from(bytes.u64()?).ok().filter(|row| (*row as usize) < rows)?;
             let figures = bytes.f32s(2)?;
             let next_inputs = bytes.f32s(inputs)?;
             let next_legal = bytes.flags(rows)?;
@@ -286,16 +284,27 @@ mod tests {
     }
 
     #[test]
-    fn bytes_that_end_too_soon_or_hold_no_priority_are_no_replay() {
+    fn bytes_that_end_too_soon_or_hold_no_priority_or_row_are_no_replay() {
         let whole = saved(&filled(0.6));
         assert!(restored(&whole).is_some());
         assert!((0..whole.len()).all(|length| restored(&whole[..length]).is_none()));
-        let priority = filled(0.6).tree.get(2).to_le_bytes();
-        let place = whole.windows(8).position(|window| window == priority).expect("it was saved");
-        for broken in [f64::NAN, f64::INFINITY, -1.0] {
+        let place =
+            |wanted: [u8; 8]| whole.windows(8).position(|window| window == wanted).expect("it was saved");
+        let (one, largest) = (filled(0.6).tree.get(2), filled(0.6).priority_max);
+        let with = |at: usize, value: [u8; 8]| {
             let mut bytes = whole.clone();
-            bytes[place..place + 8].copy_from_slice(&broken.to_le_bytes());
-            assert!(restored(&bytes).is_none(), "{broken}");
+            bytes[at..at + 8].copy_from_slice(&value);
+            bytes
+        };
+        for priority in [one, largest] {
+            for broken in [f64::NAN, f64::INFINITY, -1.0] {
+                let bytes = with(place(priority.to_le_bytes()), broken.to_le_bytes());
+                assert!(restored(&bytes).is_none(), "{broken} for {priority}");
+            }
         }
+        // Behind the first priority and the inputs stands the row, of which there is one.
+        let row = place(filled(0.6).tree.get(0).to_le_bytes()) + 8 + 4;
+        assert!(restored(&with(row, 0_u64.to_le_bytes())).is_some());
+        assert!(restored(&with(row, 1_u64.to_le_bytes())).is_none());
     }
 }
