@@ -10,6 +10,7 @@ import { Clock, RATES } from "../../src/exchange/report/page/clock.js";
 import { unpackedText } from "../../src/exchange/report/page/decode.js";
 import { byName, linkOf, linkToList, linked, relink } from "../../src/exchange/report/page/link.js";
 import { Recording } from "../../src/exchange/report/page/moment.js";
+import { Plots } from "../../src/exchange/report/page/plots.js";
 import { mainCollision, mainFinding, recursInWords } from "../../src/exchange/report/page/words.js";
 
 /** Frames as a browser hands them out, at times that the test says. */
@@ -256,4 +257,68 @@ test("what a module imports stands before it", () => {
       assert.ok(order.indexOf(from) < order.indexOf(name), `${name} imports ${from}, which stands behind it`);
     }
   }
+});
+
+/** Just so much of a browser as a canvas needs: what is drawn is noted. */
+function canvas(width, height) {
+  const drawn = [];
+  const context = new Proxy(
+    { measureText: (text) => ({ width: 6 * text.length }) },
+    {
+      get: (own, name) => own[name] ?? ((...values) => void drawn.push([name, ...values])),
+      set: (own, name, value) => Boolean(drawn.push([name, value])),
+    },
+  );
+  const on = {};
+  const element = {
+    style: {},
+    clientWidth: width,
+    clientHeight: height,
+    getContext: () => context,
+    getBoundingClientRect: () => ({ left: 100, width }),
+    addEventListener: (name, act) => (on[name] = act),
+    setPointerCapture: () => {},
+  };
+  return { element, drawn, on };
+}
+
+test("every row is drawn in its box, the cursor at its time, and a press seeks", () => {
+  const { element, drawn, on } = canvas(484, 400);
+  const still = canvas(0, 0);
+  globalThis.document = { createElement: () => still.element, documentElement: {} };
+  globalThis.getComputedStyle = () => ({ getPropertyValue: (name) => name });
+  globalThis.window = { devicePixelRatio: 1 };
+  const { recording: of } = recording();
+  Object.assign(of.header, {
+    margins: [{ requirement: "gap", unit: "m", parts: [[1, 6]] }],
+    summary: { breaches: [{ requirement: "gap", at_s: 0.02, until_s: null }] },
+    rows: ["walk()"],
+    steps: [
+      { at_s: 0, outcome: { kind: "done", row: 0, text: "walk(5 m)", made: [1], at_s: 0 } },
+      { at_s: 0.02, outcome: { kind: "refused", row: 0, rule: null, reason: "" } },
+      { at_s: 0.03, outcome: { kind: "passed" } },
+    ],
+  });
+  of.header.ego.proc = 2;
+  const sought = [];
+  const plots = new Plots(element, of, (timeS) => sought.push(timeS), of);
+  plots.draw(0.02);
+  const texts = still.drawn.filter(([name]) => name === "fillText").map(([, text]) => text);
+  for (const label of ["Speed", "Accel.", "ProC", "gap", "Held by", "Actions", "walk", "refused walk()", "–", "✕", "0 s"])
+    assert.ok(texts.includes(label), `${label} is in ${texts}`);
+  const tops = still.drawn.filter(([name, , x]) => name === "fillText" && x === 2).map(([, , , y]) => y);
+  assert.ok(Math.max(...tops) < Number.parseFloat(element.style.height), "all labels are on the canvas");
+  for (const [name, x, y] of still.drawn.filter(([name]) => name === "lineTo" || name === "moveTo"))
+    assert.ok(x >= 74 && x <= 474 && y >= 0 && y <= 400, `${name} ${x} ${y}`);
+  assert.deepEqual(drawn.find(([name]) => name === "moveTo"), ["moveTo", 274, 0]);
+  const painted = still.drawn.length;
+  plots.draw(0.03);
+  assert.equal(still.drawn.length, painted, "the still is drawn once for a size");
+  plots.repaint();
+  plots.draw(0.03);
+  assert.ok(still.drawn.length > painted, "and anew when the colours change");
+  on.pointerdown({ pointerId: 1, clientX: 100 + 274 });
+  on.pointermove({ buttons: 0, clientX: 100 });
+  on.pointermove({ buttons: 1, clientX: 100 + 474 });
+  assert.deepEqual(sought, [0.02, 0.04]);
 });
