@@ -54,6 +54,8 @@ mod position;
 pub mod rename;
 pub mod signature;
 pub mod structure;
+#[cfg(test)]
+mod tests;
 mod tokens;
 pub mod words;
 mod workspace;
