@@ -1,6 +1,7 @@
 //! What could be written at a place: the kinds of names that fit where `syntax::unfinished` puts its own name into the
 //! tree, or the keywords that the grammar expects if no name fits.
 
+use avastra_base::units::Dimension;
 use avastra_lang::check::{Declaration, References, Symbol};
 use avastra_lang::model::Type;
 use avastra_lang::model::vocabulary::{
@@ -9,8 +10,9 @@ use avastra_lang::model::vocabulary::{
     StartField, StopReason, THERE, TrajectoryField, WAIT, Word, parts_of, parts_of_named, things,
 };
 use avastra_lang::syntax::ast::{
-    Action, ActionParam, Arm, BinaryOp, Call, Effect, EffectKind, Expr, ExprKind, Field, Initial, ItemKind,
-    Name, Phase, Policy, Rule, RuleBody, Scenario, Spawn, State, Step, Type as WrittenType, TypeKind,
+    Action, ActionParam, Arm, BinaryOp, Call, Clause, ClauseKind, Effect, EffectKind, Expr, ExprKind, Field,
+    Initial, ItemKind, Name, Phase, Policy, Rule, RuleBody, Scenario, Spawn, State, Step,
+    Type as WrittenType, TypeKind,
 };
 use avastra_lang::syntax::{HERE, Unfinished, unfinished};
 
@@ -425,7 +427,12 @@ impl<'a> Place<'a> {
         if is_here(&scenario.road) {
             return Some(vec![Kind::Roads]);
         }
-        let claim = || scenario.expects.iter().find_map(|expect| self.within(&expect.claim, None, None));
+        let claim = || {
+            scenario.expects.iter().find_map(|expect| {
+                let clause = || expect.clauses.iter().find_map(|clause| self.in_clause(clause));
+                self.within(&expect.claim, None, None).or_else(clause)
+            })
+        };
         scenario
             .start
             .iter()
@@ -456,7 +463,23 @@ impl<'a> Place<'a> {
             true => Some(vec![Kind::Parameters(called.clone(), false)]),
             false => self.plain_value(&field.value, self.parameter_type(called, &field.name.text)),
         };
-        self.in_row(&step.action).or_else(|| step.drawn.iter().find_map(drawn))
+        let moment = Place { about: About::Facts(Site::Trigger), locals: Vec::new(), ..*self };
+        let (bool, time) = (Some(Type::Bool), Some(Type::Quantity(Dimension::DURATION)));
+        let mut times = step.held.iter().chain(&step.after);
+        self.in_row(&step.action)
+            .or_else(|| step.drawn.iter().find_map(drawn))
+            .or_else(|| moment.within(step.once.as_ref()?, bool, bool))
+            .or_else(|| times.find_map(|expr| self.plain_value(expr, time)))
+    }
+
+    /// Within `with`, `at` or `by` of a claim.
+    fn in_clause(&self, clause: &Clause) -> Option<Vec<Kind>> {
+        match (&clause.kind, &clause.value.kind) {
+            (ClauseKind::By, ExprKind::List(drivers)) if drivers.iter().any(is_named_here) => {
+                Some(vec![Kind::Words(words::drivers())])
+            }
+            _ => self.plain_value(&clause.value, None),
+        }
     }
 
     /// Within the arguments of an action: `drive_ahead(lane: Left)`.

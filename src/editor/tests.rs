@@ -88,6 +88,30 @@ fn what_fits_at_the_cursor_is_proposed() {
     assert!(proposed("rule r on lift: ego.‸").contains(&"speed".to_owned()));
 }
 
+/// A scenario with this step and claim.
+fn scenario(step: &str, claim: &str) -> String {
+    let road = "road way { map: \"way.xodr\" }";
+    format!("{road}\nscenario one {{\n  road: way\n  start {{ }}\n  steps {{ {step} }}\n  {claim}\n}}")
+}
+
+#[test]
+fn every_part_of_a_scenario_has_proposals() {
+    let holds = |step: &str, claim: &str, wanted: &str| {
+        let found = proposed(&scenario(step, claim));
+        assert!(found.contains(&wanted.to_owned()), "{step} {claim}: {found:?}");
+    };
+    holds("0: ‸", "", "lift");
+    holds("0: lift(to: ‸)", "", "High");
+    holds("0: lift(to: High) once ego.‸", "", "speed");
+    holds("0: lift(to: High) once ego.speed > 3 ‸", "", "km/h");
+    holds("0: lift(to: High) once ego.speed > 3 m/s for 2 ‸", "", "s");
+    holds("0: lift(to: High) after 2 ‸", "", "s");
+    holds("0: wait()", "expect ‸", "collision");
+    holds("0: wait()", "expect collision at 3 ‸", "s");
+    holds("0: wait()", "expect avoidable by [‸]", "cc");
+    holds("0: wait()", "expect avoidable by [cc, ‸]", "fsm");
+}
+
 #[test]
 fn a_name_says_what_the_checker_knows_of_it() {
     let told = |marked: &str| {

@@ -6,7 +6,7 @@ use avastra_lang::model::vocabulary::{
     PastWord, ROAD_USER, RoadField, SINCE, ShownLights, Side, Site, SpawnField, StartField, TYPES, Then,
     TrafficRule, Turning, Verb, Word,
 };
-use avastra_lang::model::{ENDS, MODULES};
+use avastra_lang::model::{DRIVERS, ENDS, MODULES};
 
 /// A word and what it means.
 pub type Entry = (&'static str, &'static str);
@@ -74,6 +74,11 @@ pub fn claim_words(claim: &str) -> &'static [&'static str] {
         "cause" => &MODULES,
         _ => &[],
     }
+}
+
+/// Driving systems by which a claim may say that something is avoided or kept.
+pub fn drivers() -> Vec<Entry> {
+    DRIVERS.into_iter().map(|driver| (driver, "")).collect()
 }
 
 /// What a field of a block means: of a spawn, an order, a road, an episode or a start.

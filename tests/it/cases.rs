@@ -52,17 +52,49 @@ pub fn copy_space(folder: &Path) {
     }
 }
 
-/// Stem and path of every case of an area, sorted.
-pub fn cases(area: &str) -> Vec<(String, PathBuf)> {
-    // What is imported is no file of ours.
-    let extension = if area == "imports" { "xosc" } else { "ava" };
-    let found = files(root().join("tests/cases").join(area), extension);
-    assert!(!found.is_empty(), "no case in {area}");
-    found.into_iter().map(|path| (stem(&path), path)).collect()
+/// The files below a folder with an extension, sorted.
+pub fn files_below(folder: impl AsRef<Path>, extension: &str) -> Vec<PathBuf> {
+    let folder = folder.as_ref();
+    let inner = entries(folder).into_iter().filter(|path| path.is_dir());
+    let mut paths: Vec<PathBuf> = inner.flat_map(|inner| files_below(inner, extension)).collect();
+    paths.extend(files(folder, extension));
+    paths.sort();
+    paths
 }
 
-/// Compares a text with `snapshots/<area>/<stem>.snap`.
+/// Name and path of every case of an area, sorted. The name is the path within the area, without the extension.
+pub fn cases(area: &str) -> Vec<(String, PathBuf)> {
+    let folder = root().join("tests/cases").join(area);
+    let found = match area {
+        // What is imported is no file of ours; in its folders stand catalogues.
+        "imports" => files(&folder, "xosc"),
+        // Beside the folders stands what all situations use.
+        "verdicts" => {
+            entries(&folder).iter().filter(|path| path.is_dir()).flat_map(|path| files(path, "ava")).collect()
+        }
+        // By subject.
+        "diagnostics" => files_below(&folder, "ava"),
+        _ => files(&folder, "ava"),
+    };
+    assert!(!found.is_empty(), "no case in {area}");
+    let name = |path: &PathBuf| {
+        path.with_extension("").strip_prefix(&folder).expect("it is there").display().to_string()
+    };
+    found.into_iter().map(|path| (name(&path), path)).collect()
+}
+
+/// The path of a case within the repository.
+pub fn case(area: &str, wanted: &str) -> String {
+    let found = cases(area).into_iter().find(|(_, path)| stem(path) == wanted);
+    let (_, path) = found.unwrap_or_else(|| panic!("no case {wanted} in {area}"));
+    path.strip_prefix(root()).expect("it is a case").display().to_string()
+}
+
+/// Compares a text with `snapshots/<area>/<stem>.snap`. What is not wanted is neither compared nor written anew.
 pub fn expect_snapshot(area: &str, stem: &str, text: &str) {
+    if !is_wanted(area, stem) {
+        return;
+    }
     let mut settings = insta::Settings::clone_current();
     settings.set_snapshot_path(root().join("snapshots").join(area));
     settings.set_prepend_module_to_snapshot(false);
@@ -70,21 +102,16 @@ pub fn expect_snapshot(area: &str, stem: &str, text: &str) {
     settings.bind(|| insta::assert_snapshot!(stem, text));
 }
 
-fn is_some_case(wanted: &str) -> bool {
-    let is_wanted = |path: &PathBuf| stem(path).contains(wanted);
-    entries(root().join("tests/cases")).iter().any(|area| entries(area).iter().any(is_wanted))
+/// Whether a case is to be tried: all are, or with `AVASTRA_CASE` in the environment those whose area and name hold that.
+#[expect(clippy::disallowed_methods, reason = "who runs the tests says which cases")]
+fn is_wanted(area: &str, name: &str) -> bool {
+    std::env::var("AVASTRA_CASE").map_or(true, |wanted| format!("{area}/{name}").contains(&wanted))
 }
 
-/// Tries every case of an area on all cores. Each that fails says why under its own name, and all are named at the end. With
-/// `AVASTRA_CASE` in the environment those alone whose names hold that.
-#[expect(clippy::disallowed_methods, reason = "who runs the tests says which cases")]
+/// Tries every case of an area that is wanted, on all cores. Each that fails says why under its own name, and all are named at
+/// the end.
 pub fn try_each(area: &str, try_one: impl Fn(&str, &Path) + Sync) {
-    let wanted = std::env::var("AVASTRA_CASE").unwrap_or_default();
-    assert!(
-        wanted.is_empty() || is_some_case(&wanted),
-        "no case in tests/cases holds `{wanted}` in its name"
-    );
-    let all = cases(area).into_iter().filter(|(stem, _)| stem.contains(&wanted));
+    let all = cases(area).into_iter().filter(|(name, _)| is_wanted(area, name));
     let waiting = Mutex::new(all);
     let next = || waiting.lock().expect("no case is tried while it is held").next();
     let failed = Mutex::new(BTreeSet::new());
@@ -105,9 +132,11 @@ pub fn try_each(area: &str, try_one: impl Fn(&str, &Path) + Sync) {
 
 /// Renders every case of an area; input and output stand together in the snapshot.
 pub fn each_case(area: &str, render: impl Fn(&Path) -> String + Sync) {
-    try_each(area, |stem, path| {
+    try_each(area, |_, path| {
         let source = std::fs::read(path).expect("a case is readable");
         let source = String::from_utf8_lossy(&source);
-        expect_snapshot(area, stem, &format!("{source}\n----\n{}", render(path)));
+        let folder = path.strip_prefix(root().join("tests/cases")).expect("it is a case").parent();
+        let folder = folder.expect("a case is in its area").display().to_string();
+        expect_snapshot(&folder, &stem(path), &format!("{source}\n----\n{}", render(path)));
     });
 }

@@ -1,15 +1,15 @@
 //! The corpus of broken files: every code occurs in two of them, every offered change removes its mistake, and
 //! every output format of diagnostics is sound.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
 use avastra::check::explain::PAGES;
 use avastra::check::{Loaded, MapCache, ReadError, differences, load, load_with};
 use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, Severity, apply_fixes};
 
-use crate::cases::{cases, each_case, files, root, stem};
+use crate::cases::{case, cases, each_case, files_below, root};
 use crate::command::{avastra, done, done_in, outcome};
 
 /// Loads a case, with `text` in place of the file's own text if there is one.
@@ -97,9 +97,12 @@ fn is_a_name(text: &str) -> bool {
 #[test]
 fn every_expectation_of_a_case_has_its_case() {
     for area in ["diagnostics", "format", "imports", "missing_use", "wishes"] {
-        let cases: Vec<String> = cases(area).into_iter().map(|(stem, _)| stem).collect();
-        let kept = files(root().join("snapshots").join(area), "snap");
-        let kept: Vec<String> = kept.iter().map(|path| stem(path)).collect();
+        let folder = root().join("snapshots").join(area);
+        let name = |path: &PathBuf| {
+            path.with_extension("").strip_prefix(&folder).expect("it is there").display().to_string()
+        };
+        let cases: BTreeSet<String> = cases(area).into_iter().map(|(name, _)| name).collect();
+        let kept: BTreeSet<String> = files_below(&folder, "snap").iter().map(name).collect();
         assert_eq!(kept, cases, "snapshots/{area} beside tests/cases/{area}");
     }
 }
@@ -154,7 +157,7 @@ fn only_commands_with_diagnostics_print_sarif() {
 #[test]
 fn sarif_has_the_structure_of_the_standard() {
     for stem in ["misspelt_name", "scenario_breaks_the_clock", "pretty_comparison", "cut_and_unfair"] {
-        let path = format!("tests/cases/diagnostics/{stem}.ava");
+        let path = case("diagnostics", stem);
         let (_, stdout, stderr) = outcome(&mut avastra(&["check", "--format", "sarif", &path]));
         let log: serde_json::Value = serde_json::from_str(&stdout).expect("the log is JSON");
         assert_eq!(log["version"], "2.1.0", "{stderr}");
@@ -189,7 +192,7 @@ fn sarif_has_the_structure_of_the_standard() {
 
 #[test]
 fn records_name_their_schema_and_their_changes() {
-    let path = "tests/cases/diagnostics/misspelt_name.ava";
+    let path = &case("diagnostics", "misspelt_name");
     let (_, _, stderr) = outcome(&mut avastra(&["check", "--format", "json", path]));
     let first: serde_json::Value =
         serde_json::from_str(stderr.lines().next().expect("a line")).expect("JSON");

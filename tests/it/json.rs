@@ -172,7 +172,7 @@ fn estimates_and_merges_are_as_explain_describes_them() {
 /// A command that fails says so under its own name, and what it found before is there.
 #[test]
 fn a_failure_is_a_result_too() {
-    let broken = "tests/cases/diagnostics/misspelt_name.ava";
+    let broken = "tests/cases/diagnostics/actions/misspelt_name.ava";
     let mistakes = result(&["check", broken]);
     assert_eq!((&mistakes["status"], &mistakes["files"][0]["file"]), (&2.into(), &broken.into()));
     for (arguments, status) in [

@@ -119,7 +119,7 @@ fn rules_are_distilled_anew_and_hold() {
 /// Every bit of every byte is flipped, except the bit that changes the case of a letter in the digest.
 #[test]
 fn a_flipped_bit_anywhere_in_a_small_policy_is_noticed() {
-    let path = root().join("tests/cases/diagnostics/policy_line_shadowed.ava");
+    let path = root().join("tests/cases/diagnostics/policies/policy_line_shadowed.ava");
     let text = std::fs::read_to_string(path).expect("it is a case");
     let sound = text.replacen("    when ego_speed > 10 m/s and time == Noon => light(on: false)\n", "", 1);
     let sound = sound.replacen("    when ego_speed > 10 m/s and time == Noon => light(false)\n", "", 1);

@@ -2,51 +2,38 @@
 //! and the avoidability that an engineer would sign, and a sentence that says why. A verdict that changes shows here, and
 //! the change is reviewed like that of a snapshot.
 
-use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::path::Path;
 
 use avastra::action::ActionTable;
 use avastra::model::{Avoidability, Claim, Scenario};
-use avastra::run::{Stage, on_threads, recorded};
+use avastra::run::{Stage, recorded};
 
-use crate::cases::{entries, name, root};
+use crate::cases::{cases, root, try_each};
 use crate::world::{read, run_of};
 
-/// The folder with a folder for each family of situations.
-const AREA: &str = "tests/cases/verdicts";
 /// The family of situations that are judged otherwise than their labels say.
-const DISPUTED: &str = "disputed";
-const THREADS: usize = 2;
+const DISPUTED: &str = "disputed/";
+
+/// A disputed situation that is judged as labelled belongs to its family.
+#[test]
+fn situations_are_judged_as_labelled() {
+    assert!(cases("verdicts").len() >= 200);
+    try_each("verdicts", |name, path| {
+        let Shown { missing, refuted } = show(path);
+        assert!(missing.is_empty(), "its label lacks {missing:?}");
+        match name.starts_with(DISPUTED) {
+            false => assert!(refuted.is_empty(), "{refuted:?}"),
+            true => assert!(!refuted.is_empty(), "it is settled: move it to its family"),
+        }
+    });
+}
 
 /// What the replay of a situation shows.
 struct Shown {
-    path: PathBuf,
     /// What its label lacks.
     missing: Vec<&'static str>,
     /// The claims that do not hold, each with what was found.
     refuted: Vec<String>,
-}
-
-#[test]
-fn situations_are_judged_as_labelled() {
-    let settled = families().into_iter().filter(|name| name != DISPUTED);
-    let paths: Vec<PathBuf> = settled.flat_map(|name| files(&name)).collect();
-    assert!(paths.len() >= 200, "{} situations", paths.len());
-    let wrong =
-        show_all(&paths).into_iter().filter(|shown| !shown.missing.is_empty() || !shown.refuted.is_empty());
-    let told = wrong
-        .map(|shown| format!("{}: without {:?}, {:?}", shown.path.display(), shown.missing, shown.refuted));
-    let told: Vec<String> = told.collect();
-    assert!(told.is_empty(), "{}", told.join("\n"));
-}
-
-/// A disputed situation that is judged as labelled belongs to its family.
-#[test]
-fn disputed_situations_are_still_disputed() {
-    for shown in show_all(&files(DISPUTED)) {
-        assert!(shown.missing.is_empty(), "{}: without {:?}", shown.path.display(), shown.missing);
-        assert!(!shown.refuted.is_empty(), "{} is settled: move it to its family", shown.path.display());
-    }
 }
 
 /// A driver that takes over after a lane change of the route stays in the lane that it is in: it neither swerves into one
@@ -67,34 +54,6 @@ fn people_who_stand_in_plain_view_can_be_avoided_after_a_lane_change_too() {
     assert!(hits >= 5, "{hits} hits show little");
 }
 
-/// The names of the families, sorted.
-fn families() -> Vec<String> {
-    entries(root().join(AREA)).iter().filter(|path| path.is_dir()).map(|path| name(path)).collect()
-}
-
-/// The situations of a family, sorted.
-fn files(family: &str) -> Vec<PathBuf> {
-    let folder = root().join(AREA).join(family);
-    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
-    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    paths.sort();
-    paths
-}
-
-fn show_all(paths: &[PathBuf]) -> Vec<Shown> {
-    let mut all = Vec::new();
-    let work = |path: &PathBuf, tell: &mut dyn FnMut(Shown) -> bool| {
-        tell(show(path));
-    };
-    let mut keep = |shown| -> Result<(), ()> {
-        all.push(shown);
-        Ok(())
-    };
-    on_threads(paths, THREADS, &AtomicBool::new(false), work, &mut keep).expect("nothing here fails");
-    assert_eq!(all.len(), paths.len());
-    all
-}
-
 /// Plays a situation and checks its claims.
 fn show(path: &Path) -> Shown {
     let loaded = avastra::check::load(path, &read).expect("it is there");
@@ -108,7 +67,7 @@ fn show(path: &Path) -> Shown {
     let results = stage.verify(&ads, &log);
     let refuted = results.iter().filter(|result| result.confirmed != Some(true));
     let refuted = refuted.map(|result| format!("{}, found {}", result.claim, result.found)).collect();
-    Shown { path: path.to_owned(), missing: missing(&scenario), refuted }
+    Shown { missing: missing(&scenario), refuted }
 }
 
 /// What the label of a situation lacks: a sentence, or one of the claims.

@@ -599,7 +599,7 @@ fn what_the_world_refuses_is_said_with_its_speed() {
     let reason = "rule `only_while_driving` says no: ego.speed = 3 m/s, wanted >= 8 m/s";
     let (_, stdout, _) = outcome(&mut avastra(&["table", space, "--row", "13"]));
     assert!(stdout.contains(reason), "{stdout}");
-    let scenario = "tests/cases/diagnostics/ego_speed_is_left_to_the_replay.ava";
+    let scenario = "tests/cases/diagnostics/scenarios/ego_speed_is_left_to_the_replay.ava";
     let (status, stdout, _) = outcome(&mut avastra(&["replay", scenario]));
     assert!(status != 0 && stdout.contains("`only_while_driving`: ego.speed = 3 m/s"), "{stdout}");
 }
