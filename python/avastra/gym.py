@@ -125,7 +125,8 @@ class Env(gymnasium.Env[Observation, np.int64]):
             EpisodeError: There is no such row, or the episode has ended: `reset` begins the next one.
         """
         observation, reward, end, info = self.episodes.step(int(action))
-        self._legal = info["action_mask"]
+        # What the caller does with its info is not done to what is legal.
+        self._legal = info["action_mask"].copy()
         terminated = _is_terminal(end)
         return self._shown(observation), reward, terminated, end is not None and not terminated, dict(info)
 

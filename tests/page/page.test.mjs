@@ -8,9 +8,12 @@ import { deflateSync } from "node:zlib";
 import { TimeAxis } from "../../src/exchange/report/page/axis.js";
 import { Clock, RATES } from "../../src/exchange/report/page/clock.js";
 import { unpackedText } from "../../src/exchange/report/page/decode.js";
+import { key } from "../../src/exchange/report/page/keys.js";
+import { filtered, kindOf } from "../../src/exchange/report/page/list.js";
 import { byName, linkOf, linkToList, linked, relink } from "../../src/exchange/report/page/link.js";
 import { Recording } from "../../src/exchange/report/page/moment.js";
 import { Plots } from "../../src/exchange/report/page/plots.js";
+import { LAYERS } from "../../src/exchange/report/page/view.js";
 import { mainCollision, mainFinding, recursInWords } from "../../src/exchange/report/page/words.js";
 
 /** Frames as a browser hands them out, at times that the test says. */
@@ -321,4 +324,73 @@ test("every row is drawn in its box, the cursor at its time, and a press seeks",
   on.pointermove({ buttons: 0, clientX: 100 });
   on.pointermove({ buttons: 1, clientX: 100 + 474 });
   assert.deepEqual(sought, [0.02, 0.04]);
+});
+
+/** A scenario of the list. */
+function entry(file, { collisions = [], breaches = [], road = "corner", shrunkFrom = null, end = "arrived" } = {}) {
+  const name = file.split("/").pop();
+  return { file: `${file}.ava`, shrunk_from: shrunkFrom, change: null, summary: { name, road, end, collisions, breaches } };
+}
+
+test("the list is what the link asks for", () => {
+  const hit = { counted: true, class: "avoidable", precrash: "pedestrian", precrash_number: 12, cause: ["planning"] };
+  const all = [
+    entry("critical/one", { collisions: [hit] }),
+    entry("shrunk/one", { collisions: [hit], shrunkFrom: "one" }),
+    entry("critical/two", { breaches: [{ requirement: "gap" }], road: "boulevard" }),
+    entry("critical/three", { end: "stalled" }),
+  ];
+  const files = (hash) => {
+    at(hash);
+    return filtered(all).map((one) => one.file.replace(".ava", ""));
+  };
+  assert.deepEqual(files("#"), ["critical/one", "critical/two", "critical/three"], "a shrunk one beside its original");
+  assert.deepEqual(files("#shrunk=1").length, 4);
+  assert.deepEqual(files("#road=boulevard"), ["critical/two"]);
+  assert.deepEqual(files("#verdict=avoidable"), ["critical/one"]);
+  assert.deepEqual(files("#q=STALLED"), ["critical/three"]);
+  assert.deepEqual(all.map(kindOf), [
+    "12 pedestrian, planning", "12 pedestrian, planning", "breach of gap", "ended: stalled",
+  ]);
+  assert.deepEqual(files(linkOf({ group: "breach of gap" })), ["critical/two"]);
+});
+
+test("keys do what the help says", () => {
+  browser();
+  at("#s=critical/one&road=corner");
+  const { recording: of } = recording();
+  of.header.steps = [{ at_s: 0 }, { at_s: 0.02 }];
+  const done = [];
+  const note = (name) => (...values) => done.push([name, ...values]);
+  const watch = {
+    clock: new Clock(of.endS, 0.02, () => {}),
+    recording: of,
+    controls: { flipFollow: note("follow"), setLayer: note("layer") },
+    toCollision: note("collision"),
+    zoom: note("zoom"),
+  };
+  const press = (name, shiftKey = false) => key({ key: name, shiftKey }, watch);
+  assert.equal(press(" ") && watch.clock.playing, true);
+  press(" ");
+  assert.equal(watch.clock.playing, false);
+  press("End");
+  assert.equal(watch.clock.timeS, 0.04);
+  press("ArrowLeft");
+  assert.ok(Math.abs(watch.clock.timeS - 0.02) < 1e-9);
+  press("Home");
+  press("ArrowRight", true);
+  assert.equal(watch.clock.timeS, 0.02, "to the next step");
+  press("ArrowRight", true);
+  assert.equal(watch.clock.timeS, 0.04, "behind the last step is the end");
+  press("ArrowLeft", true);
+  assert.equal(watch.clock.timeS, 0.02);
+  for (const name of ["f", "c", "+", "1", "0"]) assert.equal(press(name), true);
+  const layers = LAYERS.map(([name]) => name);
+  assert.deepEqual(done.map(([name]) => name), ["follow", "collision", "zoom", "layer", "layer"]);
+  assert.deepEqual(done.filter(([name]) => name === "layer").map(([, layer]) => layer), [layers[0], layers[9]]);
+  press("]");
+  assert.equal(watch.clock.rate, 2);
+  assert.equal(press("x"), false, "other keys are the browser's");
+  press("Escape");
+  assert.equal(location.hash, "#road=corner");
 });

@@ -76,6 +76,13 @@ class OneWorld(unittest.TestCase):
         self.assertEqual((terminated, truncated, info["row"]), (False, False, -1))
         self.assertIn(":", info["refused"])
 
+    def test_a_changed_info_changes_nothing(self):
+        env = made()
+        for info in (env.reset(seed=1)[1], env.step(0)[4]):
+            kept = env.unwrapped.action_masks()
+            info["action_mask"][:] = ~info["action_mask"]
+            np.testing.assert_array_equal(env.unwrapped.action_masks(), kept)
+
     def test_an_episode_ends_judged(self):
         env = made(ads="idm")
         env.reset(seed=avastra.episode_seed(5, 11))
@@ -180,6 +187,24 @@ class ManyWorlds(unittest.TestCase):
             return env.step([0, 0])[4]["seed"].tolist()
 
         self.assertEqual(seeds(True), seeds(False))
+
+    def test_the_last_observation_has_its_own_mask(self):
+        env = avastra.gym.VectorEnv(2, SPACE, "crossroad", mask="observation", autoreset_mode="SAME_STEP")
+        plain = avastra.gym.VectorEnv(2, SPACE, "crossroad", autoreset_mode="DISABLED")
+        env.reset(seed=3)
+        plain.reset(seed=3)
+        ended = np.zeros(2, dtype=bool)
+        while not ended.any():
+            rows = env.action_masks().argmax(axis=1)
+            observation, _, terminated, truncated, info = env.step(rows)
+            last = plain.step(rows)[0]
+            self.assertIn(observation, env.observation_space)
+            ended = terminated | truncated
+        for world in np.flatnonzero(ended):
+            final = info["final_obs"][world]
+            np.testing.assert_array_equal(final["observation"], last[world])
+            np.testing.assert_array_equal(final["action_mask"].astype(bool), info["final_info"]["action_mask"][world])
+            np.testing.assert_array_equal(final["action_mask"].astype(bool), plain.action_masks()[world])
 
     def test_modes_have_names_and_options_are_known(self):
         for mode in AutoresetMode:

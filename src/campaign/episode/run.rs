@@ -191,8 +191,6 @@ pub struct Play {
     ads: Box<dyn Ads>,
     sensed: Sensed,
     memory: Memory,
-    /// Seed of the draws of actions, and of the agent's choices.
-    seed: u64,
     /// Steps without progress up to now.
     stalled: u32,
     /// When each action last happened, s; empty if the space does not ask.
@@ -218,7 +216,6 @@ impl Play {
             sensed,
             memory: setup.memory.clone(),
             steps: Vec::new(),
-            seed: setup.seed,
             stalled: 0,
             happened_s: match setup.table.space().asks_when_actions_happened() {
                 true => vec![f64::NEG_INFINITY; setup.table.space().actions.len()],
@@ -283,7 +280,7 @@ impl Play {
             road: self.setup.road(),
             rules: &self.setup.rules,
             surroundings: &self.world,
-            seed: self.seed,
+            seed: self.setup.seed,
             step: self.steps.len() as u64,
             happened_s: &self.happened_s,
         }

@@ -10,6 +10,15 @@ export class Controls {
   /** Makes the controls that move the clock and the views of an open replay. */
   constructor(watch) {
     const { clock } = watch;
+    this.watch = watch;
+    this.follow = checkbox({ id: "follow", checked: true }, (on) => watch.follow(on));
+    /** The box of each layer. */
+    this.boxes = new Map(
+      LAYERS.map(([name]) => {
+        const box = checkbox({ name, checked: watch.layers.has(name) }, (on) => watch.toggleLayer(name, on));
+        return [name, box];
+      }),
+    );
     this.play = button("▶", "Play (space)", () => clock.toggle(), { id: "play", class: "primary" });
     this.scrubber = el("input", {
       type: "range",
@@ -43,18 +52,25 @@ export class Controls {
         this.rate,
         button("−", "Zoom out (-)", () => watch.zoom(1 / ZOOM)),
         button("+", "Zoom in (+)", () => watch.zoom(ZOOM), { id: "zoom" }),
-        el(
-          "label",
-          { class: "layer" },
-          checkbox({ id: "follow", checked: true }, (on) => watch.follow(on)),
-          " Follow",
-        ),
+        el("label", { class: "layer" }, this.follow, " Follow"),
         el("button", { type: "button", id: "copy", onclick: (event) => watch.copy(event.target) }, COPY_LINK),
         button("?", "Keys (?)", showKeys, { id: "keys" }),
       ),
-      el("fieldset", { class: "row layers" }, el("legend", {}, "Layers"), layers(watch)),
+      el("fieldset", { class: "row layers" }, el("legend", {}, "Layers"), layers(this.boxes)),
       comparison(watch),
     );
+  }
+
+  /** Shows or hides a layer, as its box does; without `on` the other way round. */
+  setLayer(name, on = !this.boxes.get(name).checked) {
+    this.boxes.get(name).checked = on;
+    this.watch.toggleLayer(name, on);
+  }
+
+  /** Follows the ego vehicle or not, the other way round. */
+  flipFollow() {
+    this.follow.checked = !this.follow.checked;
+    this.watch.follow(this.follow.checked);
   }
 
   /** Follows the clock. */
@@ -75,15 +91,9 @@ function checkbox(attributes, changed) {
   return el("input", { type: "checkbox", ...attributes, onchange: (event) => changed(event.target.checked) });
 }
 
-function layers(watch) {
+function layers(boxes) {
   return LAYERS.map(([name, label, sign]) =>
-    el(
-      "label",
-      { class: `layer ${name}` },
-      checkbox({ name, checked: watch.layers.has(name) }, (on) => watch.toggleLayer(name, on)),
-      el("span", { "aria-hidden": "true" }, sign),
-      ` ${label}`,
-    ),
+    el("label", { class: `layer ${name}` }, boxes.get(name), el("span", { "aria-hidden": "true" }, sign), ` ${label}`),
   );
 }
 

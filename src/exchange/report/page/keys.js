@@ -48,7 +48,7 @@ export function key(event, watch) {
     Home: () => clock.seek(0),
     End: () => clock.seek(clock.endS),
     c: () => watch.toCollision(),
-    f: () => document.getElementById("follow")?.click(),
+    f: () => watch.controls.flipFollow(),
     "-": () => watch.zoom(1 / ZOOM),
     "+": () => watch.zoom(ZOOM),
     "[": () => clock.faster(-1),
@@ -61,7 +61,7 @@ export function key(event, watch) {
   }
   const layer = /^\d$/.test(event.key) ? LAYERS[(Number(event.key) + 9) % 10] : null;
   if (!layer) return false;
-  /** @type {HTMLInputElement} */ (document.querySelector(`input[name="${layer[0]}"]`)).click();
+  watch.controls.setLayer(layer[0]);
   return true;
 }
 

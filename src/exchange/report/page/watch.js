@@ -209,8 +209,7 @@ class Watch {
   }
 
   #watchDrivers(timeS) {
-    const box = /** @type {HTMLInputElement} */ (document.querySelector('input[name="drivers"]'));
-    if (!box.checked) box.click();
+    this.controls.setLayer("drivers", true);
     this.clock.seek(timeS);
     this.clock.play();
     this.views[0].canvas.element.scrollIntoView({ block: "nearest" });

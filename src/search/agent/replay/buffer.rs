@@ -113,6 +113,10 @@ impl Replay {
         let is_place = |next: &usize| *next < settings.replay_capacity;
         let next = usize::try_from(next).ok().filter(is_place)?;
         let count = usize::try_from(count).ok().filter(|count| *count <= settings.replay_capacity)?;
+        // Until it is full, the next one stands behind the last.
+        if count < settings.replay_capacity && next != count {
+            return None;
+        }
         let mut replay = Replay { next, priority_max, ..Replay::new(settings) };
         for index in 0..count {
             let priority = Some(bytes.f64s(1)?[0]).filter(is_priority)?;
@@ -302,6 +306,17 @@ mod tests {
                 assert!(restored(&bytes).is_none(), "{broken} for {priority}");
             }
         }
+        // Where the next one goes, behind the number of transitions: a full replay has begun anew somewhere, one that is not
+        // full nowhere.
+        let next = Writer::new().into_bytes().len() + 8;
+        assert!(restored(&with(next, 4_u64.to_le_bytes())).is_some());
+        assert!(restored(&with(next, 5_u64.to_le_bytes())).is_none());
+        let mut short = empty(0.6);
+        short.push(transition(1.0));
+        let mut bytes = saved(&short);
+        assert!(restored(&bytes).is_some());
+        bytes[next..next + 8].copy_from_slice(&3_u64.to_le_bytes());
+        assert!(restored(&bytes).is_none());
         // Behind the first priority and the inputs stands the row, of which there is one.
         let row = place(filled(0.6).tree.get(0).to_le_bytes()) + 8 + 4;
         assert!(restored(&with(row, 0_u64.to_le_bytes())).is_some());
