@@ -6,8 +6,13 @@ import { COMPARED, COPY_LINK, NOTHING, linked, nameOf } from "./link.js";
 import { LAYERS, ZOOM } from "./view.js";
 import { driverInWords, figure } from "./words.js";
 
+/** @import { Watch } from "./watch.js" */
+/** @import { Clock } from "./clock.js" */
 export class Controls {
-  /** Makes the controls that move the clock and the views of an open replay. */
+  /**
+   * Makes the controls that move the clock and the views of an open replay.
+   * @param {Watch} watch
+   */
   constructor(watch) {
     const { clock } = watch;
     this.watch = watch;
@@ -61,7 +66,11 @@ export class Controls {
     );
   }
 
-  /** Shows or hides a layer, as its box does; without `on` the other way round. */
+  /**
+   * Shows or hides a layer, as its box does; without `on` the other way round.
+   * @param {string} name
+   * @param {boolean} [on]
+   */
   setLayer(name, on = !this.boxes.get(name).checked) {
     this.boxes.get(name).checked = on;
     this.watch.toggleLayer(name, on);
@@ -73,7 +82,10 @@ export class Controls {
     this.watch.follow(this.follow.checked);
   }
 
-  /** Follows the clock. */
+  /**
+   * Follows the clock.
+   * @param {Clock} clock
+   */
   show({ timeS, playing, rate }) {
     this.scrubber.value = timeS;
     this.scrubber.setAttribute("aria-valuetext", figure(timeS, "s", 2));

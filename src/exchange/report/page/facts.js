@@ -17,7 +17,16 @@ import {
   plural,
 } from "./words.js";
 
-/** Everything about the collisions of a scenario; `watchDrivers` shows the reference drivers from a time on. */
+/** @import { Entry, Header, Outcome, Summary } from "./data" */
+/** @import { Recording } from "./moment.js" */
+
+/**
+ * Everything about the collisions of a scenario; `watchDrivers` shows the reference drivers from a time on.
+ * @param {HTMLElement} place
+ * @param {Recording} recording
+ * @param {(timeS: number) => void} seek
+ * @param {(timeS: number) => void} watchDrivers
+ */
 export function showVerdict(place, recording, seek, watchDrivers) {
   const { collisions, summary } = recording.header;
   const parts = collisions.map((collision) => verdict(recording, collision, seek, watchDrivers));
@@ -128,7 +137,10 @@ function endOf(recording, way) {
   return `slows down to ${kmh(slowest)}${way.avoids ? "" : `, until ${timeOf(speeds.length - 1)}`}`;
 }
 
-/** A warning before everything else, where the replay is not what the file claims. */
+/**
+ * A warning before everything else, where the replay is not what the file claims.
+ * @param {Summary} summary
+ */
 export function refutedClaims({ refuted }) {
   if (refuted.length === 0) return null;
   return el(
@@ -148,12 +160,18 @@ export function refutedClaims({ refuted }) {
   );
 }
 
-/** Where a scenario comes from: space, driving system with its profile, seed. */
+/**
+ * Where a scenario comes from: space, driving system with its profile, seed.
+ * @param {Header} header
+ */
 export function origin({ origin: known }) {
   return el("p", { class: "muted", id: "origin" }, known.map(([name, text]) => `${name}: ${text}`).join(" · "));
 }
 
-/** The moment in figures; gives a function that updates it. */
+/**
+ * The moment in figures; gives a function that updates it.
+ * @param {HTMLElement} place
+ */
 export function showMoment(place) {
   const names = ["Time", "Speed", "Pedals", "ProC", "Held by", "Weather"];
   const cells = names.map(() => el("dd", {}, ""));
@@ -178,7 +196,12 @@ export function showMoment(place) {
   };
 }
 
-/** The road users of a moment as a table. */
+/**
+ * The road users of a moment as a table.
+ * @param {HTMLElement} place
+ * @param {Recording} recording
+ * @param {number} timeS
+ */
 export function showUsers(place, recording, timeS) {
   const ego = recording.ego(timeS);
   const rows = recording
@@ -197,7 +220,23 @@ export function showUsers(place, recording, timeS) {
   );
 }
 
-/** The actions of all steps: offered, masked and by which rule, chosen, refused. */
+/**
+ * What became of a step.
+ * @param {Outcome} outcome
+ * @param {string[]} rows
+ */
+function outcomeInWords(outcome, rows) {
+  if (outcome.kind === "done") return outcome.text;
+  if (outcome.kind === "passed") return "no action";
+  return `refused: ${rows[outcome.row] ?? ""}: ${outcome.rule ? `${outcome.rule}: ` : ""}${outcome.reason}`;
+}
+
+/**
+ * The actions of all steps: offered, masked and by which rule, chosen, refused.
+ * @param {HTMLElement} place
+ * @param {Recording} recording
+ * @param {(timeS: number) => void} seek
+ */
 export function showSteps(place, recording, seek) {
   const { steps, rows, obstacles } = recording.header;
   const phases = obstacles.flatMap(({ id, phases = [] }) => phases.map(([atS, what]) => ({ id, atS, what })));
@@ -205,11 +244,7 @@ export function showSteps(place, recording, seek) {
     const endS = steps[number + 1]?.at_s ?? Infinity;
     const begun = phases.filter(({ atS }) => atS > step.at_s - 1e-6 && atS < endS - 1e-6);
     const { outcome, offers } = step;
-    const said = {
-      done: () => outcome.text,
-      passed: () => "no action",
-      refused: () => `refused: ${rows[outcome.row] ?? ""}: ${outcome.rule ? `${outcome.rule}: ` : ""}${outcome.reason}`,
-    }[outcome.kind]();
+    const said = outcomeInWords(outcome, rows);
     const masked = offers?.masked ?? [];
     const isMasked = masked.reduce((sum, [, list]) => sum + list.length, 0);
     const details =
@@ -267,7 +302,11 @@ export function showSteps(place, recording, seek) {
   return (step) => shown.forEach((row) => row.classList.toggle("marked", Number(row.dataset.step) === step));
 }
 
-/** Links to the shrunk twin, or to that of which this is one. */
+/**
+ * Links to the shrunk twin, or to that of which this is one.
+ * @param {Entry} entry
+ * @param {Entry[]} scenarios
+ */
 export function twins(entry, scenarios) {
   const link = (other, text) => el("a", { href: linkOf({ s: nameOf(other) }) }, text);
   const own = entry.shrunk_from;

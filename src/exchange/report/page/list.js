@@ -16,7 +16,7 @@ import {
   recursInWords,
 } from "./words.js";
 
-/** @import { Entry, Finding } from "./data" */
+/** @import { Entry, Finding, Index } from "./data" */
 
 /**
  * What one can filter by: name in the link, heading, and the value of a scenario.
@@ -36,13 +36,19 @@ export const FILTERS = [
   ["change", "Compared", (entry) => CHANGES[entry.change?.kind] ?? "–"],
 ];
 
-/** Tells shrunk scenarios that the list leaves out until asked: those whose original is on the page. */
+/**
+ * Tells shrunk scenarios that the list leaves out until asked: those whose original is on the page.
+ * @param {Entry[]} scenarios
+ */
 function hiddenTwins(scenarios) {
   const found = new Set(scenarios.filter((entry) => !entry.shrunk_from).map((entry) => entry.summary.name));
   return (entry) => entry.shrunk_from && found.has(entry.shrunk_from);
 }
 
-/** The scenarios that the link asks for. */
+/**
+ * The scenarios that the link asks for.
+ * @param {Entry[]} scenarios
+ */
 export function filtered(scenarios) {
   const parts = linked();
   const isHidden = hiddenTwins(scenarios);
@@ -56,7 +62,10 @@ export function filtered(scenarios) {
   });
 }
 
-/** What makes two failures alike, as `avastra run` groups them. */
+/**
+ * What makes two failures alike, as `avastra run` groups them.
+ * @param {Entry} entry
+ */
 export function kindOf(entry) {
   const collision = mainCollision(entry.summary);
   const [breach] = entry.summary.breaches;
@@ -66,7 +75,11 @@ export function kindOf(entry) {
   return `${precrash_number ? `${precrash_number} ` : ""}${precrash}${because}`;
 }
 
-/** The filters, the list and its charts; they stay in step with the link. */
+/**
+ * The filters, the list and its charts; they stay in step with the link.
+ * @param {HTMLElement} place
+ * @param {Index} data
+ */
 export function showList(place, data) {
   const { scenarios } = data;
   const found = el("div", { id: "found" });
@@ -167,6 +180,9 @@ function rowClass(summary, hit) {
   return [hit?.counted && "counted", isFluke && "fluke"].filter(Boolean).join(" ") || null;
 }
 
+/**
+ * @param {Entry[]} list
+ */
 function listing(list) {
   const shown = COLUMNS.filter(([name]) => name !== "Compared" || list.some((entry) => entry.change));
   const rows = list.map((entry) => {
@@ -196,7 +212,10 @@ function listing(list) {
   );
 }
 
-/** How many there are of each kind, as bars that filter. */
+/**
+ * How many there are of each kind, as bars that filter.
+ * @param {Entry[]} list
+ */
 function barCharts(list) {
   /** @type {[string, string, (entry: Entry) => string][]} */
   const charts = [

@@ -3,9 +3,13 @@ import { el, refill } from "./dom.js";
 import { View } from "./view.js";
 import { atTime } from "./words.js";
 
+/** @import { Recording } from "./moment.js" */
 const STILL_LAYERS = new Set(["truth", "signals"]);
 
-/** The five moments of a scenario: four seconds up to the collision, or evenly through it. */
+/**
+ * The five moments of a scenario: four seconds up to the collision, or evenly through it.
+ * @param {Recording} recording
+ */
 export function stillTimes(recording) {
   const collision = recording.collision();
   if (!collision) return [0, 0.25, 0.5, 0.75, 1].map((share) => share * recording.endS);
@@ -13,7 +17,14 @@ export function stillTimes(recording) {
   return [-4, -2.5, -1.5, -0.5, 0].map((before) => Math.max(0, at + before));
 }
 
-/** Fills an element with the stills; `seek` opens a moment, `peek` shows one while the pointer is on its still. */
+/**
+ * Fills an element with the stills; `seek` opens a moment, `peek` shows one while the pointer is on its still.
+ * @param {HTMLElement} place
+ * @param {Recording} recording
+ * @param {any} road
+ * @param {(timeS: number) => void} seek
+ * @param {(timeS: number | null) => void} peek
+ */
 export function drawStrip(place, recording, road, seek, peek) {
   const times = stillTimes(recording);
   const views = [];

@@ -4,6 +4,7 @@ import { Labels, drawBody, drawImpact, drawPlan, drawPrediction, drawSpeed, draw
 import { Canvas, palette } from "./paint.js";
 import { kmh } from "./words.js";
 
+/** @import { Recording } from "./moment.js" */
 /** How much nearer one step of the zoom comes. */
 export const ZOOM = 1.3;
 
@@ -27,12 +28,21 @@ const AHEAD_S = [1, 2, 3];
 const IMPACT_SHOWN_S = 1.5;
 
 export class View {
+  /**
+   * @param {HTMLCanvasElement} element
+   * @param {Recording} recording
+   * @param {any} road as `ground` gives it
+   * @param {Set<string>} layers those that are shown
+   */
   constructor(element, recording, road, layers) {
     this.canvas = new Canvas(element);
     this.recording = recording;
     this.road = road;
     this.layers = layers;
     this.follows = true;
+    /** The moment that is drawn, s. */
+    this.timeS = 0;
+    /** @type {number | null} */
     this.zoomed = null;
     this.shift = { x: 0, y: 0 };
     this.#handle(element);
@@ -42,7 +52,10 @@ export class View {
     this.canvas.colours = palette();
   }
 
-  /** Draws the moment. */
+  /**
+   * Draws the moment.
+   * @param {number} timeS
+   */
   draw(timeS) {
     this.timeS = timeS;
     const { canvas, recording, layers } = this;
@@ -203,11 +216,17 @@ export class View {
     context.stroke();
   }
 
+  /**
+   * @param {number} factor
+   */
   zoom(factor) {
     this.zoomed = Math.min(Math.max(this.canvas.camera.pxPerM * factor, 0.8), 60);
     this.draw(this.timeS);
   }
 
+  /**
+   * @param {boolean} on
+   */
   follow(on) {
     this.follows = on;
     if (on) this.shift = { x: 0, y: 0 };

@@ -64,7 +64,7 @@ async function other(data, entry, wanted) {
   return { recording: recorded, road, name: nameOf(found) };
 }
 
-class Watch {
+export class Watch {
   // What it is made of, once it is built.
   /** @type {Controls} */
   controls;
