@@ -14,7 +14,7 @@ Needs `gymnasium>=1.2.2,<2`: `pip install './python[gym]'`.
   as much as doing nothing. `info["action_mask"]` says which rows are legal next, `action_masks()` says it to
   sb3-contrib, and with `mask="observation"` the observation is a dict with it.
 - A **step** drives for the space's observation period. A **collision** does not end an episode. Arriving at the goal
-  terminates it; its limit of steps, standing still or a failure of an external driving system truncates it.
+  terminates it; its limit of steps, standing still, leaving the map or a failure of an external driving system truncates it.
 - The **reward** is by default `judged`: the constants of `avastra train`, paid at the collision's own step, and only if it
   counts.
 - A **seed** that `reset` gets is the seed of that episode: the same as any other of avastra's. Without one, it is drawn.
@@ -56,7 +56,7 @@ class Env(gymnasium.Env[Observation, np.int64]):
     Args:
         space: A path, or a compiled `Space`.
         road: The name of one of its roads; without one the first.
-        observation: `scaled`, shape (36,), about 1 in size, or `raw`, shape (44,), in SI units: as in `avastra.Episodes`.
+        observation: `scaled`, about 1 in size, or `raw`, in SI units: as in `avastra.Episodes`, which says the shapes.
         reward: `judged`, or `space` for the reward that the space declares: as in `avastra.Episodes`.
         mask: `info`, or `observation` for a dict of `observation` and `action_mask`.
         **conditions: Those of `avastra.Episodes`: `ads`, `ads_config`, `ads_cmd`, `ambient`, `traffic`, `with_rules`,
@@ -230,7 +230,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
 
         Raises:
             EpisodeError: There is no such row, or in the mode `DISABLED` an episode has ended. No world has moved then, and
-                the next episodes are those that they would have been.
+                the next episodes are those that they would have been. In `SAME_STEP` also if an external driving system
+                fails as the next episode begins: all worlds have moved then.
         """
         begin: List[int] = np.flatnonzero(self._has_ended).tolist()
         if self.autoreset_mode == AutoresetMode.DISABLED and begin:

@@ -19,7 +19,7 @@ if [ ! -d "$work/node_modules/axe-core" ] || [ ! -d "$work/node_modules/typescri
   (cd "$work" && npm install --no-audit --no-fund --silent puppeteer-core axe-core eslint @eslint/js globals prettier typescript)
 fi
 
-# The linter reads each module. That a name stands once in all of them, which become one script, shows when the page opens.
+# The linter reads each module. That a name stands once in all of them, which become one script, `tests/page` keeps.
 cp "$root/tests/interop/report.eslint.mjs" "$work/eslint.config.mjs"
 rm -rf "$work/lint" && mkdir "$work/lint"
 cp "$root"/src/exchange/report/page/*.js "$work/lint"

@@ -118,7 +118,8 @@ pub fn try_each(area: &str, try_one: impl Fn(&str, &Path) + Sync) {
     let try_all = || {
         while let Some((stem, path)) = next() {
             if let Err(cause) = std::panic::catch_unwind(AssertUnwindSafe(|| try_one(&stem, &path))) {
-                let cause = cause.downcast_ref::<String>().map_or("see above", String::as_str);
+                let text = cause.downcast_ref::<String>().map(String::as_str);
+                let cause = text.or(cause.downcast_ref::<&str>().copied()).unwrap_or("see above");
                 println!("case {area}/{stem} failed: {cause}");
                 failed.lock().expect("no case is tried while it is held").insert(stem);
             }

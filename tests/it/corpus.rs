@@ -70,7 +70,7 @@ fn every_message_is_worded_for_authors() {
                 let is_long = |number: &str| number.split('.').nth(1).is_some_and(|digits| digits.len() > 6);
                 let mut numbers = own.split(|c: char| !c.is_ascii_digit() && c != '.');
                 let why = match () {
-                    () if own.starts_with(char::is_uppercase) && !is_a_name(&own) => "begins upper case",
+                    () if own.starts_with(char::is_uppercase) && !is_not_ours(&own) => "begins upper case",
                     () if own.ends_with('.') => "ends with a full stop",
                     () if ["::", "Some(", "Ok(", "Err(", "pest", "serde"]
                         .iter()
@@ -89,7 +89,7 @@ fn every_message_is_worded_for_authors() {
 }
 
 /// Whether the words are not ours: a code point, or what the system says.
-fn is_a_name(text: &str) -> bool {
+fn is_not_ours(text: &str) -> bool {
     text.starts_with("U+") || text.contains("(os error ")
 }
 

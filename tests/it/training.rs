@@ -233,7 +233,6 @@ fn what_cannot_be_trained_is_said_so() {
     }
 }
 
-/// What was learned up to then is kept, and no number that is none is written.
 #[test]
 fn a_training_that_diverges_is_said_so() {
     let scratch = tempfile::tempdir().expect("a scratch directory");

@@ -1,4 +1,4 @@
-// The page's modules without a browser: `node --test tests/page`. `tests/interop/report.sh` opens whole pages in one.
+// The page's modules without a browser: `node --test tests/page/*.test.mjs`. `tests/interop/report.sh` opens whole pages in one.
 import assert from "node:assert/strict";
 import { readFileSync, readdirSync } from "node:fs";
 import { test } from "node:test";
@@ -294,7 +294,7 @@ test("every row is drawn in its box, the cursor at its time, and a press seeks",
   const { recording: of } = recording();
   Object.assign(of.header, {
     margins: [{ requirement: "gap", unit: "m", parts: [[1, 6]] }],
-    summary: { breaches: [{ requirement: "gap", at_s: 0.02, until_s: null }] },
+    summary: { breaches: [{ requirement: "gap", at_s: 0.02, until_s: 0.04 }] },
     rows: ["walk()"],
     steps: [
       { at_s: 0, outcome: { kind: "done", row: 0, text: "walk(5 m)", made: [1], at_s: 0 } },

@@ -260,6 +260,7 @@ impl Play {
         self.end()
     }
 
+    /// What the episode is made of.
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
@@ -355,7 +356,7 @@ impl Play {
             if near.is_none_or(|near| now.probability > near.probability) {
                 near = Some(now);
             }
-            if self.is_over().is_some() {
+            if self.over().is_some() {
                 break;
             }
         }
@@ -430,8 +431,8 @@ impl Play {
         self.ads.failure().map(|failure| End::Failed(failure.kind()))
     }
 
-    /// The end of an episode that goes on at no tick more.
-    fn is_over(&self) -> Option<End> {
+    /// How the episode has ended, if no further tick is driven.
+    fn over(&self) -> Option<End> {
         match () {
             () if self.setup.table.space().episode.stop_arrived && self.world.arrived() => Some(End::Arrived),
             () if self.world.left_the_map() => Some(End::LeftMap),
@@ -439,7 +440,7 @@ impl Play {
         }
     }
 
-    /// The end of an episode that goes on with no step more.
+    /// How the episode has ended, if no further step is played.
     fn end(&self) -> Option<End> {
         let episode = &self.setup.table.space().episode;
         let is_stalled = || episode.stalled_steps.is_some_and(|limit| self.stalled >= limit);
@@ -449,7 +450,7 @@ impl Play {
             () => End::Stalled,
         };
         let is_last = || self.steps.len() >= episode.step_limit as usize;
-        self.is_over().or_else(|| is_stalled().then(stalled)).or_else(|| is_last().then_some(End::StepLimit))
+        self.over().or_else(|| is_stalled().then(stalled)).or_else(|| is_last().then_some(End::StepLimit))
     }
 
     /// The log of the episode, which ended so.
@@ -486,6 +487,7 @@ mod tests {
     use std::path::Path;
     use std::sync::Mutex;
 
+    use avastra_drivers::external::{Failure, Problem};
     use avastra_drivers::{Selected, Status, by_name};
     use avastra_lang::check::{ReadError, load};
     use avastra_lang::model::RulesInForce;
@@ -507,6 +509,8 @@ mod tests {
     struct Taped {
         driver: Box<dyn Ads>,
         tape: Tape,
+        /// The call at which it gives up, and why.
+        failure: Option<(usize, Failure)>,
     }
 
     impl Ads for Taped {
@@ -517,6 +521,11 @@ mod tests {
 
         fn status(&self) -> &Status {
             self.driver.status()
+        }
+
+        fn failure(&self) -> Option<&Failure> {
+            let asked = self.tape.lock().unwrap().iter().filter(|call| **call == "drive").count();
+            self.failure.as_ref().filter(|(call, _)| asked >= *call).map(|(_, failure)| failure)
         }
     }
 
@@ -542,7 +551,7 @@ rule never on dry: ego.speed > 60 m/s
         let road = &space.roads[0];
         let memory = space.memory_at_start(road, &rules, seed).unwrap();
         Setup {
-            road: 0,
+            road_index: 0,
             scene: Arc::new(Scene::of(road)),
             rules: Arc::new(rules),
             ads: Selected::new(by_name("modular").unwrap()),
@@ -557,9 +566,18 @@ rule never on dry: ego.speed > 60 m/s
 
     /// Plays an episode and notes every call; `choose` says what happens in which step.
     fn taped(choose: &dyn Fn(&Moment) -> Choice) -> (EpisodeLog, Vec<&'static str>) {
+        taped_from(&setup(), None, choose)
+    }
+
+    /// As [`taped`], from another setup, or with a driving system that gives up at a call.
+    fn taped_from(
+        setup: &Setup,
+        failure: Option<(usize, Failure)>,
+        choose: &dyn Fn(&Moment) -> Choice,
+    ) -> (EpisodeLog, Vec<&'static str>) {
         let tape = Tape::default();
-        let mut play = Play::new(&setup());
-        play.ads = Box::new(Taped { driver: play.ads, tape: tape.clone() });
+        let mut play = Play::new(setup);
+        play.ads = Box::new(Taped { driver: play.ads, tape: tape.clone(), failure });
         let log = run_from(
             play,
             &mut |moment| {
@@ -591,6 +609,28 @@ rule never on dry: ego.speed > 60 m/s
         assert_eq!(calls.iter().filter(|call| **call == "drive").count(), 5);
         assert_eq!(calls[calls.len() - 2..], ["choose", "last"]);
         assert_eq!((log.end, log.steps.len()), (End::Script, 1));
+    }
+
+    #[test]
+    fn who_gives_up_within_a_step_ends_the_episode_there() {
+        let failure = Failure::new(Problem::Exited, "step 7", "it is gone");
+        let (log, calls) = taped_from(&setup(), Some((8, failure.clone())), &pour);
+        // Seven ticks are driven; at the eighth it answers nothing, and nothing moves.
+        assert_eq!((log.end, log.steps.len(), log.ticks), (End::Failed(failure.kind()), 2, 7));
+        assert_eq!(calls[calls.len() - 2..], ["drive", "last"]);
+        assert_eq!(log.failure, Some(failure));
+    }
+
+    #[test]
+    fn who_arrives_within_a_step_is_driven_no_further() {
+        let mut near = setup();
+        near.start.ego_mps = 10.0;
+        let mut play = Play::new(&near);
+        let goal_m = near.scene.route.goal_m;
+        play.world = World::with_ego_at(near.scene.clone(), &near.start, goal_m - 5.5, 10.0);
+        let log = run_from(play, &mut |moment| pour(moment), &mut |_, _, _| {}, &mut |_| {});
+        assert_eq!((log.end, log.steps.len()), (End::Arrived, 1));
+        assert!(log.ticks < 5, "{} ticks", log.ticks);
     }
 
     #[test]

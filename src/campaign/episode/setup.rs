@@ -13,7 +13,7 @@ use avastra_world::sim::{Scene, Start};
 pub struct Setup {
     pub table: ActionTable,
     /// Index of the road in the space.
-    pub road: usize,
+    pub road_index: usize,
     pub scene: Arc<Scene>,
     pub rules: Arc<RulesInForce>,
     pub ads: Selected,
@@ -29,7 +29,8 @@ pub struct Setup {
 }
 
 impl Setup {
+    /// The road that is driven.
     pub fn road(&self) -> &Road {
-        &self.table.space().roads[self.road]
+        &self.table.space().roads[self.road_index]
     }
 }

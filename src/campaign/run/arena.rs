@@ -132,7 +132,7 @@ impl Arena {
         let memory = memory.expect("the arena was made with a start on each road");
         episode::Setup {
             table: self.table.clone(),
-            road: *index,
+            road_index: *index,
             scene: scene.clone(),
             rules: self.rules.clone(),
             ads: self.ads.clone(),

@@ -399,8 +399,11 @@ pub(crate) fn insert_row(
 /// order of the columns.
 macro_rules! of_columns {
     ($row:expr, $first:literal, $of:ident { $($field:ident),+ $(,)? }) => {{
-        let mut columns = $first..;
-        let mut next = || columns.next().expect("there is always one more number");
+        let mut column: usize = $first;
+        let mut next = || {
+            column += 1;
+            column - 1
+        };
         $of { $($field: $row.get::<usize, _>(next())?),+ }
     }};
 }

@@ -47,7 +47,7 @@ impl<'a> Stage<'a> {
         let memory = start.memory.clone();
         episode::Setup {
             table: self.table.clone(),
-            road: self.scenario.road,
+            road_index: self.scenario.road,
             scene: self.scene.clone(),
             rules: self.rules.clone(),
             ads: ads.clone(),

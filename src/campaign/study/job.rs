@@ -44,17 +44,17 @@ pub fn play_jobs<E>(
     clock: &(dyn Fn() -> Spent + Sync),
     on: &mut dyn FnMut(Event) -> Result<(), E>,
 ) -> Result<(), E> {
-    let work =
-        |job: &Job, tell: &mut dyn FnMut(Event) -> bool| match play(study, job, clock, &mut |counted| {
-            tell(Event::Episode { counted })
-        }) {
+    let work = |job: &Job, tell: &mut dyn FnMut(Event) -> bool| {
+        let played = play(study, job, clock, &mut |counted| tell(Event::Episode { counted }));
+        match played {
             Ok(Some(cells)) => drop(tell(Event::Done(cells))),
             Ok(None) => {}
             Err(why) => {
                 let agent = study.agent(job).label.clone();
                 tell(Event::Diverged { agent, number: job.number, why });
             }
-        };
+        }
+    };
     on_threads(jobs, threads, stop, work, on)
 }
 

@@ -1,8 +1,8 @@
 //! A page of HTML that holds everything: style, script and data. It opens from a file, and asks nothing of a network.
 //!
 //! The script is ES modules, one file for each subject; here they are joined into one, in the order in which they use
-//! each other, without their `import` lines and the word `export`. A name is therefore declared once in all of them;
-//! a browser refuses the page otherwise (`tests/interop/report.sh`).
+//! each other, without their `import` lines, the word `export` and documentation. A name is therefore declared once in
+//! all of them (kept by `tests/page`); `tests/interop/report.sh` opens pages in a browser.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;

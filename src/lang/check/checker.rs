@@ -58,8 +58,7 @@ pub(super) struct Spent {
     pub compiled: usize,
 }
 
-/// The declarations that are checked so far, in the order of [`space`], and their diagnostics. A list of what comes later is
-/// empty.
+/// The declarations that are checked so far, and their diagnostics. A list of what comes later in [`space`] is empty.
 #[derive(Default)]
 pub(super) struct Checker {
     pub(super) announced: Announced,

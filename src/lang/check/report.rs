@@ -4,7 +4,8 @@ use crate::check::names::{Names, unknown};
 use crate::model::code;
 use crate::model::vocabulary::Word;
 use crate::syntax::ast::{Field, Name, Span};
-use crate::syntax::{Diagnostic, ast};
+use crate::syntax::{Diagnostic, ast, print_expr};
+use avastra_base::units::Rational;
 
 /// A check that collects mistakes and goes on after each.
 pub(super) trait Report {
@@ -90,6 +91,15 @@ pub(super) trait Report {
     fn missing_field<T>(&mut self, field: impl Word, span: Span, message: String) -> Option<T> {
         let error = Diagnostic::error(code::MISSING_FIELD, message);
         self.reject(error.at(span, format!("`{}: …` is missing", field.name())))
+    }
+}
+
+/// An expression as it is written, and its value beside it where that does not show.
+pub(super) fn with_value(expr: &ast::Expr, value: Rational, unit: &str) -> String {
+    let written = print_expr(expr);
+    match expr.kind {
+        ast::ExprKind::Number(_) => format!("`{written}`"),
+        _ => format!("`{written}` ({} {unit})", value.to_f64()),
     }
 }
 

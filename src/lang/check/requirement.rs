@@ -4,13 +4,13 @@ use crate::check::checker::{Checker, docs};
 use crate::check::expression::Place;
 use crate::check::names::Names;
 use crate::check::references::Symbol;
-use crate::check::report::Report;
+use crate::check::report::{Report, with_value};
 use crate::model::expr::{Comparison, Expr, ExprKind};
 use crate::model::requirement::{margin_dimension, open_divisor, past_inside};
 use crate::model::vocabulary::{BEGINS, BREACHED, EVENTS, MARGIN, NearWord, PastWord, Site, Word, things};
 use crate::model::{BodyWord, RequirementDef, RuleDef, TICK_MS, Type, code};
 use crate::syntax::ast::{ItemKind, Span};
-use crate::syntax::{Diagnostic, ast, print_expr};
+use crate::syntax::{Diagnostic, ast};
 use avastra_base::units::{Dimension, Rational};
 
 /// The most requirements of a space: a set of them fits one integer, and each is judged at every tick.
@@ -19,11 +19,10 @@ const REQUIREMENTS_MAX: usize = 64;
 /// The longest `within`, s: that of an observation period.
 const WITHIN_S_MAX: i64 = 600;
 
-/// The requirements of a space.
-#[derive(Default)]
+/// The requirements of a space. All names are known from the first one on: one that asks about another is told why it cannot.
 pub(super) struct Required {
     names: Names,
-    /// Those without a mistake, each with the dimension of its margin.
+    /// Those that were checked and have no mistake, each with the dimension of its margin.
     margins: Vec<(String, Option<Dimension>)>,
 }
 
@@ -32,7 +31,7 @@ impl Checker {
     pub(super) fn requirements(&mut self, items: &[&ast::Item], rules: &[RuleDef]) -> Vec<RequirementDef> {
         let mut requirements = Vec::new();
         let (names, all) = self.declared("requirement", items, ItemKind::as_require);
-        let mut required = Required { names, margins: Vec::new() };
+        self.required = Some(Required { names, margins: Vec::new() });
         if let Some((_, first)) = all.get(REQUIREMENTS_MAX) {
             let message = format!("more than {REQUIREMENTS_MAX} requirements");
             let error = Diagnostic::error(code::TOO_MUCH, message).at(first.name.span, "one too many");
@@ -49,10 +48,11 @@ impl Checker {
             }
             let requirement = self.requirement(item, declared);
             let margin = requirement.as_ref().map(|of| (of.name.clone(), of.margin));
-            required.margins.extend(margin);
+            if let Some(required) = &mut self.required {
+                required.margins.extend(margin);
+            }
             requirements.extend(requirement);
         }
-        self.required = Some(required);
         requirements
     }
 
@@ -320,7 +320,7 @@ impl Checker {
         match ticks.filter(is_possible) {
             Some(ticks) => Some(ticks.to_f64().ceil() as u32),
             None => {
-                let message = format!("a requirement cannot wait `{}`", print_expr(time));
+                let message = format!("a requirement cannot wait {}", with_value(time, exact_s, "s"));
                 let error = Diagnostic::error(code::SETTING, message);
                 let wanted = format!("must be at least a tick of {TICK_MS} ms and at most {WITHIN_S_MAX} s");
                 self.reject(error.at(found.span, wanted).help(help))

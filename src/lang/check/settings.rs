@@ -2,13 +2,13 @@
 
 use crate::check::checker::{Checker, docs, each};
 use crate::check::expression::Place;
-use crate::check::report::Report;
+use crate::check::report::{Report, with_value};
 use crate::check::rule::names_in;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{EpisodeField, Fact, Site, StopReason, Word};
 use crate::model::{COUNTED, EpisodeDef, RewardCase, TICK_MS, Type, VerdictDef, code};
 use crate::syntax::ast::{BinaryOp, Comparison, ItemKind, Span};
-use crate::syntax::{Diagnostic, ast, print_expr};
+use crate::syntax::{Diagnostic, ast};
 use avastra_base::units::{Dimension, Rational};
 
 /// The paper's observation period, s.
@@ -93,8 +93,8 @@ impl Checker {
         if is_whole && seconds > 0.0 && seconds <= STEP_S_MAX {
             return Some(seconds);
         }
-        let error =
-            Diagnostic::error(code::SETTING, format!("a step of `{}` is not possible", print_expr(value)));
+        let message = format!("a step of {} is not possible", with_value(value, exact_s, "s"));
+        let error = Diagnostic::error(code::SETTING, message);
         let wanted = format!("must be a multiple of {TICK_MS} ms, more than 0 s and at most {STEP_S_MAX} s");
         self.reject(error.at(value.span, wanted).help("time passes in ticks; write for example `6 s`"))
     }

@@ -13,31 +13,55 @@ use crate::syntax::ast::Span;
 use crate::syntax::{Diagnostic, ast, listed};
 use avastra_base::units::{Dimension, Rational};
 
-/// A field that means nothing to some verbs: to which, why, and what to know before the field is left out.
-type IdleField = (SpawnField, fn(Verb) -> bool, &'static str, &'static str);
+/// A field that means nothing to some verbs.
+struct IdleField {
+    field: SpawnField,
+    is_idle: fn(Verb) -> bool,
+    /// Why, of the verb.
+    what: &'static str,
+    help: &'static str,
+}
 
+const fn idle(
+    field: SpawnField,
+    is_idle: fn(Verb) -> bool,
+    what: &'static str,
+    help: &'static str,
+) -> IdleField {
+    IdleField { field, is_idle, what, help }
+}
+
+/// A field that means nothing for several reasons has a row for each; the first one counts.
 const IDLE_FIELDS: [IdleField; 13] = {
     const FOLLOWS: fn(Verb) -> bool = |verb| verb == Verb::Follow;
     const ON_FOOT: fn(Verb) -> bool = |verb| verb.is_on_foot();
+    const WALKS: fn(Verb) -> bool = |verb| verb == Verb::Walk;
     const NO_WALK: fn(Verb) -> bool = |verb| verb != Verb::Walk;
+    const NO_CROSSING: fn(Verb) -> bool = |verb| verb != Verb::CrossRoad;
+    use SpawnField::{Early, Ignores, Lane, Lights, Meet, Offset, Side, Siren, Turn, Waits};
     [
-        (SpawnField::Ignores, FOLLOWS, "minds nobody", "it follows its trajectory whatever comes; "),
-        (SpawnField::Siren, FOLLOWS, "has no driver", ""),
-        (SpawnField::Turn, FOLLOWS, "has no driver", ""),
-        (SpawnField::Lane, FOLLOWS, "begins on its trajectory", ""),
-        (SpawnField::Side, FOLLOWS, "begins on its trajectory", ""),
-        (SpawnField::Ignores, ON_FOOT, "ignores nothing", "rules of the road are for vehicles; "),
-        (SpawnField::Siren, ON_FOOT, "has no siren", ""),
-        (SpawnField::Lights, ON_FOOT, "has no lights", ""),
-        (SpawnField::Turn, ON_FOOT, "drives through no junction", ""),
-        (SpawnField::Offset, |verb| verb == Verb::Walk, "begins at the kerb", ""),
-        (SpawnField::Meet, NO_WALK, "is met at no point of the ego vehicle", "`meet` is for `Walk`; "),
-        (SpawnField::Waits, NO_WALK, "waits at no kerb", "`waits` is for `Walk`; "),
-        (
-            SpawnField::Early,
-            |verb| verb != Verb::CrossRoad,
+        idle(
+            Ignores,
+            FOLLOWS,
+            "minds nobody",
+            "it follows its trajectory whatever comes; leave `ignores` out",
+        ),
+        idle(Siren, FOLLOWS, "has no driver", "leave `siren` out"),
+        idle(Turn, FOLLOWS, "has no driver", "leave `turn` out"),
+        idle(Lane, FOLLOWS, "begins on its trajectory", "leave `lane` out"),
+        idle(Side, FOLLOWS, "begins on its trajectory", "leave `side` out"),
+        idle(Ignores, ON_FOOT, "ignores nothing", "rules of the road are for vehicles; leave `ignores` out"),
+        idle(Siren, ON_FOOT, "has no siren", "leave `siren` out"),
+        idle(Lights, ON_FOOT, "has no lights", "leave `lights` out"),
+        idle(Turn, ON_FOOT, "drives through no junction", "leave `turn` out"),
+        idle(Offset, WALKS, "begins at the kerb", "leave `offset` out"),
+        idle(Meet, NO_WALK, "is met at no point of the ego vehicle", "`meet` is for `Walk`; leave it out"),
+        idle(Waits, NO_WALK, "waits at no kerb", "`waits` is for `Walk`; leave it out"),
+        idle(
+            Early,
+            NO_CROSSING,
             "does not meet the ego vehicle at a junction",
-            "`early` is for `CrossRoad`, and for manoeuvres; ",
+            "`early` is for `CrossRoad`, and for manoeuvres; leave it out",
         ),
     ]
 };
@@ -296,18 +320,18 @@ impl Checker {
     /// Reports fields that mean nothing to a verb.
     fn check_fields(&mut self, fields: &[(SpawnField, &ast::Expr)], verb: &WordExpr<Verb>) {
         let verbs = possible(verb);
-        for (wanted, is_idle, what, help) in IDLE_FIELDS {
-            let idle = verbs.iter().find(|verb| is_idle(**verb));
-            if let (Some(value), Some(verb)) = (field(fields, wanted), idle) {
-                let message = format!("`{}` {what}", verb.name());
-                let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message);
-                let help = format!("{help}leave `{}` out", wanted.name());
-                self.report(error.at(value.span, "without effect").help(help));
-            }
+        let reason = |field: SpawnField| {
+            let mut reasons = IDLE_FIELDS.into_iter().filter(|idle| idle.field == field);
+            reasons.find_map(|idle| Some((verbs.iter().find(|verb| (idle.is_idle)(**verb))?, idle)))
+        };
+        for (field, value) in fields {
+            let Some((verb, idle)) = reason(*field) else { continue };
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, format!("`{}` {}", verb.name(), idle.what));
+            self.report(error.at(value.span, "without effect").help(idle.help));
         }
-        let (meet, waits) = (field(fields, SpawnField::Meet), field(fields, SpawnField::Waits));
-        if let (Some(_), Some(waits)) = (meet, waits) {
-            let message = "it sets out after a time or for a meeting";
+        let said = |wanted: SpawnField| field(fields, wanted).filter(|_| reason(wanted).is_none());
+        if let (Some(_), Some(waits)) = (said(SpawnField::Meet), said(SpawnField::Waits)) {
+            let message = format!("`{}` sets out after a time or for a meeting", Verb::Walk.name());
             let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(waits.span, "both are said");
             self.report(error.help("leave `waits` or `meet` out"));
         }

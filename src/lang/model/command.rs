@@ -285,8 +285,8 @@ struct Figure {
     value: fn(&mut Command) -> &mut Option<f64>,
 }
 
-/// One row a figure: its field, unit and bounds, whether it may be left out, and from where it goes to where. A field of two
-/// dimensions is two figures.
+/// One row a figure: its field, unit and bounds, whether it may be left out, and its fields in [`CommandDef`] and in [`Command`]. A
+/// field of two dimensions is two figures.
 macro_rules! figures {
     ($(($field:ident, $unit:literal, $bounds:ident, $left_out:literal,
         $from:ident $(in $dimension:ident)? => $into:ident)),+ $(,)?) => {

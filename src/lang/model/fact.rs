@@ -15,54 +15,64 @@ use crate::model::vocabulary::{Known, Word, words};
 use avastra_base::units::Dimension;
 
 /// What stands where a fact is found.
-trait Told: Copy {
+trait FactValue: Copy {
     /// Where nothing is found.
-    const MISSING: Value = Value::Number(f64::NAN);
+    const MISSING: Value;
 
-    fn value(self) -> Value {
-        Value::Number(self.number())
-    }
+    fn value(self) -> Value;
+}
 
+/// The same of a number. No truth is one, so that none of the moment or the tick can be taken for a number.
+trait Number: Copy {
     fn number(self) -> f64;
 }
 
-impl Told for f64 {
+impl Number for f64 {
     fn number(self) -> f64 {
         self
     }
 }
 
-impl Told for u32 {
+impl Number for u32 {
     fn number(self) -> f64 {
         self.into()
     }
 }
 
-impl Told for i32 {
+impl Number for i32 {
     fn number(self) -> f64 {
         self.into()
     }
 }
 
-impl Told for u64 {
+impl Number for u64 {
     fn number(self) -> f64 {
         self as f64
     }
 }
 
-impl Told for bool {
+macro_rules! numbers {
+    ($($of:ty),+) => {
+        $(impl FactValue for $of {
+            const MISSING: Value = Value::Number(f64::NAN);
+
+            fn value(self) -> Value {
+                Value::Number(self.number())
+            }
+        })+
+    };
+}
+numbers!(f64, u32, i32, u64);
+
+impl FactValue for bool {
     const MISSING: Value = Value::Bool(false);
 
     fn value(self) -> Value {
         Value::Bool(self)
     }
-
-    fn number(self) -> f64 {
-        self.into()
-    }
 }
 
-fn told<T: Told>(found: Option<T>) -> Value {
+fn found_value<T: FactValue>(found: Option<T>) -> Value {
     found.map_or(T::MISSING, T::value)
 }
 
@@ -93,8 +103,8 @@ macro_rules! source {
 
 /// A fact of the kind that is asked for, as a function; `None` for others.
 macro_rules! if_of {
-    (moment, moment, $($part:ident).+) => { Some(|moment| Told::number(moment.$($part).+)) };
-    (tick, tick, $($part:ident).+) => { Some(|tick| Told::number(tick.$($part).+)) };
+    (moment, moment, $($part:ident).+) => { Some(|moment| Number::number(moment.$($part).+)) };
+    (tick, tick, $($part:ident).+) => { Some(|tick| Number::number(tick.$($part).+)) };
     ($kind:ident, $other:ident, $($part:ident).+) => { None };
 }
 
@@ -124,7 +134,7 @@ macro_rules! facts {
 
             /// Its value; NaN, or false, where it is not known.
             pub(crate) fn value(self, facts: &Facts<'_>) -> Value {
-                match self { $(Fact::$fact => told(source!(facts, $source).map(|of| of.$($part).+))),+ }
+                match self { $(Fact::$fact => found_value(source!(facts, $source).map(|of| of.$($part).+))),+ }
             }
 
             /// What a fact of the moment is; `None` for another one.

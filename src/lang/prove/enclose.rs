@@ -292,9 +292,13 @@ fn between(low: f64, high: f64) -> Interval {
 /// What a fact that is a number may be, on any road and at any moment.
 pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
     let (low, high) = fact.range().into_inner();
-    (fact.ty() != Type::Bool).then(|| match high == f64::INFINITY && low == 0.0 {
-        true => Interval::NOT_NEGATIVE,
-        false => between(low, high),
+    (fact.ty() != Type::Bool).then(|| match (low, high) {
+        (0.0, f64::INFINITY) => Interval::NOT_NEGATIVE,
+        (f64::NEG_INFINITY, f64::INFINITY) => Interval::ALL,
+        (low, high) => {
+            debug_assert!(low.is_finite() && high.is_finite(), "no other half line is known");
+            between(low, high)
+        }
     })
 }
 

@@ -8,7 +8,7 @@ use super::trajectory::{Lesson, Trajectory};
 
 /// A network's values are no numbers any more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the network diverged in update {update}: lower `learning_rate`, or bound `gradient_norm_max`")]
+#[error("the network diverged in update {update}: lower `learning_rate`, or set `gradient_norm_max`")]
 pub struct Diverged {
     pub update: u64,
 }

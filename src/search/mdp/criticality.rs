@@ -165,8 +165,8 @@ impl Seen {
 }
 
 /// The least post-encroachment time of an episode: from when one road user leaves a place where ways cross until the other
-/// comes. Requirements ask at every tick how long ago somebody left the place (`sim::Encroachment`); here it is looked every
-/// 0.1 s, and only ways that cross count.
+/// comes. Requirements ask at every tick how long ago somebody left the place (`sim::Encroachment`); here the world is
+/// looked at every 0.1 s, and only ways that cross count.
 #[derive(Debug, Clone, Default)]
 pub struct LeastEncroachment {
     /// Outline of the ego vehicle every 0.1 s.
@@ -265,8 +265,8 @@ mod tests {
         assert!(is_near(met_s(24.0, 0.0, 0.0, 0.0, 0.0), 2.0));
         assert!(is_near(met_s(24.0, 0.0, 0.0, -10.0, 0.0), 1.0));
         assert_eq!(met_s(24.0, 0.0, 0.0, 10.0, 0.0), None);
-        // From the right, half a car's length and half a car's width to go: 17 m at 10 m/s.
-        assert!(is_near(met_s(20.0, -20.0, core::f64::consts::FRAC_PI_2, 0.0, 10.0), 1.7));
+        // From the right: its front is 22 m before the ego vehicle's side, which is still there then.
+        assert!(is_near(met_s(20.0, -25.0, core::f64::consts::FRAC_PI_2, 0.0, 10.0), 2.2));
         // A metre beside the ego vehicle's way, and beyond 8 s.
         assert_eq!(met_s(24.0, 3.0, 0.0, 0.0, 0.0), None);
         assert_eq!(met_s(90.0, 0.0, 0.0, 0.0, 0.0), None);

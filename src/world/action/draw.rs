@@ -273,7 +273,7 @@ impl<'a> Judge<'a> {
     fn effects<'f>(&'f self, locals: &[Value], after: &Memory) -> (Vec<Effect>, Vec<&'f EffectDef>) {
         let facts = self.facts(locals, after);
         let functions = &self.row.space.functions;
-        // Nothing is asked of those by whom a row has fewer.
+        // A road user that this row leaves out takes no order.
         let appears = |spawn: &SpawnDef| spawn.appears(functions, &facts);
         let missing = self.action.spawns().filter(|spawn| !appears(spawn)).filter_map(|spawn| spawn.bearer);
         let missing: Vec<usize> = missing.collect();

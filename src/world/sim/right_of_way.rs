@@ -290,7 +290,7 @@ impl Rights {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        // What was found on the road follows from where somebody stands.
+        // What was found on the road follows from the pedestrian's position.
         let Rights { passed, shares, meeting, wreck, is_foreseen, on_road: _ } = self;
         PassedLight::trace(passed.as_ref(), trace);
         trace.flags([

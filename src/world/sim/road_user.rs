@@ -314,7 +314,7 @@ impl Running {
 
     fn trace(&self, trace: &mut Trace) {
         let Running { course, phase, stage, since, tracked } = self;
-        trace.words([course.part as u64, *phase as u64, *since]);
+        trace.words([course.part as u64, *phase as u64, *since, course.arguments().count() as u64]);
         trace.words(course.arguments());
         match *stage {
             Stage::Waiting(held) => trace.words([0, held.map_or(0, |tick| tick + 1)]),
@@ -327,18 +327,45 @@ impl Running {
         }
         trace.flags([tracked.is_some()]);
         if let Some(Tracked { course, phase, first }) = tracked {
-            trace.words([course.part as u64, *phase as u64]);
+            trace.words([course.part as u64, *phase as u64, course.arguments().count() as u64]);
             trace.words(course.arguments());
             trace_command(first, trace);
         }
     }
 }
 
-/// What was told, as far as it is still asked: the rest was done as it was told.
+/// What was told, as far as it is still asked.
 fn trace_command(command: &Command, trace: &mut Trace) {
-    let Command { speed_mps, rate_mps2, turn, .. } = command;
-    let has = [speed_mps.is_some(), rate_mps2.is_some(), turn.is_some()];
-    trace.flags([has[0], has[1], has[2], command.goes_aside(), command.pursues()]);
+    let Command {
+        speed_mps,
+        rate_mps2,
+        turn,
+        // Whether one of them is said is asked below; how, was handed over to the driver as it was told.
+        lane: _,
+        offset_m: _,
+        keep_m: _,
+        keep_s: _,
+        early_s: _,
+        // These were handed over as they were told.
+        is_continuous: _,
+        aside_mps: _,
+        aside_s: _,
+        time_gap_s: _,
+        to: _,
+        at_m: _,
+        reach_m: _,
+        steady_m: _,
+        ignores: _,
+        siren: _,
+        lights: _,
+    } = command;
+    trace.flags([
+        speed_mps.is_some(),
+        rate_mps2.is_some(),
+        turn.is_some(),
+        command.goes_aside(),
+        command.pursues(),
+    ]);
     trace.numbers(speed_mps.iter().chain(rate_mps2).copied());
 }
 

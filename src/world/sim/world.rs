@@ -123,7 +123,7 @@ struct Switch {
 #[derive(Debug, Clone)]
 pub struct World {
     scene: Arc<Scene>,
-    // The state: what later ticks depend on. `trace` covers all of it but the profile of traffic, which no tick changes.
+    // The state: what later ticks depend on. `trace` covers all of it but scene and profile of traffic, which no tick changes.
     ticks: u64,
     ego: Ego,
     /// Place of the ego vehicle's rear axle beside the route.
@@ -443,8 +443,8 @@ impl World {
         }
     }
 
-    /// Feeds every bit of the state that later ticks depend on to `trace`, in a fixed order. Here and in what it calls, the
-    /// pattern names every field, so that a new one cannot be forgotten.
+    /// Feeds every bit of the state that later ticks depend on to `trace`, in a fixed order. Here, and for everything that moves,
+    /// a pattern names every field, so that a new one cannot be forgotten.
     pub fn trace(&self, trace: &mut Trace) {
         let World {
             ticks,

@@ -58,7 +58,7 @@ export class Clock {
     this.changed(this.timeS);
   }
 
-  /** Ends it without a word: a frame that is due would play on beside the next one. */
+  /** Stops without calling `changed`. The due frame is cancelled, or a new `play` would run beside it. */
   stop() {
     if (this.#frame !== null) cancelAnimationFrame(this.#frame);
     this.#frame = null;

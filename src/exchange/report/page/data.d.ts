@@ -1,5 +1,5 @@
-// What the page reads: written by `report/recording.rs`, `report/mind.rs` and `report/page.rs`, held against them by
-// `tests/it/report.rs`. A `Column` is the number of a column of values, packed by `report/columns.rs`.
+// What the page reads: written by `report/recording.rs`, `report/mind.rs` and `report/page.rs`. `tests/it/report.rs` holds the
+// names of the fields, and of plain ones whether they are numbers, texts, truths or lists, against what is written. A `Column` is the number of a column of values, packed by `report/columns.rs`.
 
 export type Column = number;
 /** Columns of x (m), y (m) and heading (rad). */
@@ -55,15 +55,15 @@ export interface Finding {
   kind: string;
   shape: string;
   precrash: string;
-  precrash_number: number;
+  precrash_number: number | null;
   verb: string;
   x_m: number;
   y_m: number;
   counted: boolean;
   class: string;
-  onset_s: number | null;
+  onset_s: number;
   avoided_by: string[];
-  letter: string | null;
+  letter: string[];
   evasion: string | null;
   priority: string;
   side: string;
@@ -101,7 +101,7 @@ export interface Breach {
   obstacle: number | null;
   docs: string;
   at_s: number;
-  until_s: number | null;
+  until_s: number;
   margin: number | null;
   unit: string | null;
   kept_by: string[] | null;

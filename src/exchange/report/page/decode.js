@@ -81,7 +81,7 @@ function textOf(id) {
 export const unpacked = (id) => unpackedText(textOf(id).trim());
 
 /**
- * The same of a text.
+ * As `unpacked`, from the text itself.
  * @param {string} text
  * @returns {Promise<{ header: Header, columns: Float64Array[] }>}
  */

@@ -215,15 +215,14 @@ function drawCurve({ canvas, axis, recording, top, height }, values, factor, [lo
 function drawMargin(box, { requirement, unit, parts }) {
   const { canvas, axis, top, height } = box;
   const { context, colours } = canvas;
-  const { recording } = box;
-  const { header, columns, tickS } = recording;
+  const { header, columns, tickS } = box.recording;
   const all = parts.flatMap(([, column]) => Array.from(columns[column]));
   const low = all.reduce((least, margin) => Math.min(least, Math.max(margin, -100)), 0);
   const high = Math.max(0.1, median(all) * 2);
   const y = (margin) => top + height - ((Math.min(Math.max(margin, low), high) - low) / (high - low)) * height;
   context.fillStyle = `color-mix(in srgb, ${colours.danger} 25%, ${colours.paper})`;
   for (const breach of header.summary.breaches.filter((one) => one.requirement === requirement)) {
-    const [left, right] = [axis.xOf(breach.at_s), axis.xOf(breach.until_s ?? recording.endS)];
+    const [left, right] = [axis.xOf(breach.at_s), axis.xOf(breach.until_s)];
     context.fillRect(left - 1, top, Math.max(right - left, 2), height);
   }
   context.strokeStyle = colours.danger;

@@ -386,12 +386,14 @@ impl Driver {
         ]);
         trace.numbers([*station_m, *speed_mps, *cruise_mps, *time_gap_s, *insists_to_m, *stopped_to_m]);
         trace.words([*waited_ticks, *aggression, *draws].map(u64::from));
+        // What is planned was drawn as it appeared: how much of it is left tells the rest.
         trace.words([u64::from(ignores.bits()), plan.len() as u64]);
         if let Some(Leader { gap_m, speed_mps, crosswise }) = *leader {
             trace.numbers([gap_m, speed_mps]);
             trace.flags([crosswise]);
         }
         trace.numbers(hold_m.iter().chain(ordered_mps2).chain(limit_part).copied());
+        // The way that it leads to follows from the lane that it leaves and the side.
         if let Some(Change { to: _, to_station_m, progress, duration_s, ends_m, broken_off }) = change {
             trace.numbers([*to_station_m, *progress, *duration_s, *ends_m]);
             trace.flags([broken_off.is_some()]);
