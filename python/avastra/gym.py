@@ -215,7 +215,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
             seed = [None if seed is None else int(seed) + world for world in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise ValueError(f"{self.num_envs} worlds need as many seeds")
-        infos = self._begin(np.flatnonzero(which), seed)
+        infos = self._begin(np.flatnonzero(which), seed, {})
+        self._add_masks(infos)
         return self._shown(), infos
 
     def step(self, actions: Any) -> Tuple[Observation, Any, Any, Any, Dict[str, Any]]:
@@ -245,10 +246,11 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
         self._has_ended = np.array([end is not None for end in ends])
         terminated = np.array([_is_terminal(end) for end in ends])
         truncated = self._has_ended & ~terminated
+        at_once = self._has_ended & (self.autoreset_mode == AutoresetMode.SAME_STEP)
         infos: Dict[str, Any] = {}
-        for world, info in enumerate(found):
-            infos = self._add_info(infos, _with_whole_seed(info), world)
-        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._has_ended.any():
+        for world in np.flatnonzero(~at_once).tolist():
+            infos = self._add_info(infos, _with_whole_seed(found[world]), world)
+        if at_once.any():
             infos = self._begin_at_once(infos, found)
         self._add_masks(infos)
         return self._shown(), rewards, terminated, truncated, infos
@@ -262,8 +264,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
         for world in self.worlds:
             world.close()
 
-    def _begin(self, worlds: np.ndarray, seeds: Sequence[Optional[int]]) -> Dict[str, Any]:
-        """Begins the next episodes of some worlds. A seed also begins a world's own sequence of seeds."""
+    def _begin(self, worlds: np.ndarray, seeds: Sequence[Optional[int]], infos: Dict[str, Any]) -> Dict[str, Any]:
+        """Begins the next episodes of some worlds and adds their infos. A seed also begins a world's own sequence of seeds."""
         given = {world: int(seed) for world, seed in enumerate(seeds) if seed is not None}
         own, generators = self._draw([world for world in worlds.tolist() if world not in given])
         generators.update({world: seeding.np_random(given[world])[0] for world in worlds.tolist() if world in given})
@@ -276,10 +278,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
         for world, seed, end in zip(worlds, drawn, ends):
             if end is not None:
                 raise EpisodeError(f"world {world}: the episode of seed {seed} ended as it began: `{end}`")
-        infos: Dict[str, Any] = {}
         for world, info in zip(worlds, found):
             infos = self._add_info(infos, _with_whole_seed(info), int(world))
-        self._add_masks(infos)
         return infos
 
     def _begin_at_once(self, infos: Dict[str, Any], found: Sequence[Mapping[str, Any]]) -> Dict[str, Any]:
@@ -290,9 +290,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
             final = {**_with_whole_seed(found[world]), "action_mask": self._legal[world].copy()}
             kept = {"final_obs": own, "final_info": final}
             infos = self._add_info(infos, kept, int(world))
-        begun = self._begin(ended, [None] * self.num_envs)
-        infos["seed"][ended] = begun["seed"][ended]
-        return infos
+        return self._begin(ended, [None] * self.num_envs, infos)
 
     def _add_masks(self, infos: Dict[str, Any]) -> None:
         infos["action_mask"] = self._legal.copy()

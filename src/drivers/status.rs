@@ -148,6 +148,20 @@ pub enum Reason {
     Reported,
 }
 
+/// How much a reason holds the speed back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Force {
+    /// It brakes as hard as it can, or drives no farther.
+    Hard,
+    /// It comes to a stop, or goes slowly until a way is free.
+    Stops,
+    /// As fast as others or the sight allow.
+    Follows,
+    /// As fast as the road allows, or what an external driving system calls in its own words.
+    Free,
+}
+
 impl Status {
     /// Replaces what is perceived by objects without forecasts; the buffers of forecasts are kept.
     pub(super) fn perceive(&mut self, objects: impl Iterator<Item = PerceivedObject>) {
@@ -176,6 +190,23 @@ impl Reason {
     /// The reason in the words of an external driving system, if it has any of its own.
     pub fn in_words(self, reported: Option<&str>) -> String {
         reported.map_or_else(|| self.to_string(), str::to_owned)
+    }
+
+    /// How much it holds the speed back.
+    pub fn force(self) -> Force {
+        match self {
+            Reason::Emergency(_) | Reason::Contact | Reason::Fallback | Reason::Degraded => Force::Hard,
+            Reason::Stop(_)
+            | Reason::StopSign
+            | Reason::RedLight
+            | Reason::Crosswalk
+            | Reason::Yield(_)
+            | Reason::Creep
+            | Reason::Approach
+            | Reason::KeepClear => Force::Stops,
+            Reason::Follow(_) | Reason::LaneChange | Reason::Sight => Force::Follows,
+            Reason::Start | Reason::Cruise | Reason::Reported => Force::Free,
+        }
     }
 
     /// The reason with the number of its object replaced.

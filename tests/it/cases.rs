@@ -92,7 +92,7 @@ pub fn case(area: &str, wanted: &str) -> String {
 
 /// Compares a text with `snapshots/<area>/<stem>.snap`. What is not wanted is neither compared nor written anew.
 pub fn expect_snapshot(area: &str, stem: &str, text: &str) {
-    if !is_wanted(area, stem) {
+    if !is_wanted(&format!("{area}/{stem}")) {
         return;
     }
     let mut settings = insta::Settings::clone_current();
@@ -102,16 +102,31 @@ pub fn expect_snapshot(area: &str, stem: &str, text: &str) {
     settings.bind(|| insta::assert_snapshot!(stem, text));
 }
 
-/// Whether a case is to be tried: all are, or with `AVASTRA_CASE` in the environment those whose area and name hold that.
+/// Whether a case is to be tried, by `area/name`: all are, or with `AVASTRA_CASE` in the environment those that hold it.
 #[expect(clippy::disallowed_methods, reason = "who runs the tests says which cases")]
-fn is_wanted(area: &str, name: &str) -> bool {
-    std::env::var("AVASTRA_CASE").map_or(true, |wanted| format!("{area}/{name}").contains(&wanted))
+fn is_wanted(case: &str) -> bool {
+    std::env::var("AVASTRA_CASE").map_or(true, |wanted| case.contains(&wanted))
+}
+
+/// Whether any case of any area is wanted: with a misspelt `AVASTRA_CASE` none would be tried, and every test would pass.
+fn is_any_wanted() -> bool {
+    let folders = ["tests/cases", "snapshots"].map(|folder| root().join(folder));
+    let [cases, snapshots] = &folders;
+    let mut paths = [files_below(cases, "ava"), files_below(cases, "xosc"), files_below(snapshots, "snap")]
+        .concat()
+        .into_iter();
+    paths.any(|path| {
+        let path =
+            folders.iter().find_map(|folder| path.strip_prefix(folder).ok()).expect("it is in one of them");
+        is_wanted(&path.with_extension("").display().to_string())
+    })
 }
 
 /// Tries every case of an area that is wanted, on all cores. Each that fails says why under its own name, and all are named at
 /// the end.
 pub fn try_each(area: &str, try_one: impl Fn(&str, &Path) + Sync) {
-    let all = cases(area).into_iter().filter(|(name, _)| is_wanted(area, name));
+    assert!(is_any_wanted(), "no case holds what AVASTRA_CASE asks for");
+    let all = cases(area).into_iter().filter(|(name, _)| is_wanted(&format!("{area}/{name}")));
     let waiting = Mutex::new(all);
     let next = || waiting.lock().expect("no case is tried while it is held").next();
     let failed = Mutex::new(BTreeSet::new());

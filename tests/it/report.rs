@@ -138,9 +138,8 @@ fn a_page_says_what_the_world_did() {
         assert_eq!(told["at_s"], was.contact.time_s);
         assert_eq!(told["ways"].as_array().unwrap().len(), 4, "four reference drivers");
     }
-    let held: Vec<&str> =
-        header["held"].as_array().unwrap().iter().filter_map(|held| held[1].as_str()).collect();
-    assert_eq!(held, log.held.iter().map(|held| held.text()).collect::<Vec<_>>());
+    let held = log.held.iter().map(|held| serde_json::json!([held.from_s, held.text(), held.force()]));
+    assert_eq!(header["held"], held.collect::<Value>());
     assert_eq!(header["source"], SOURCE);
     let (ground, lines) = unpacked(&html, "g0");
     let lane = |index: &Value| lines[index.as_u64().unwrap() as usize].len();

@@ -125,7 +125,7 @@ function recording() {
   const way = { from_s: 0.02, every_s: 0.02, places: [4, 5, 5], speed_mps: 4 };
   const header = {
     ego, obstacles: [other], tracks: [], plans: { counts: 6, x_m: 7, y_m: 8 }, steps: [{ at_s: 0 }, { at_s: 0.04 }],
-    held: [[0, "limit"], [0.03, "leader"]], skies: [], signals: { 3: [[0, "red"], [2, "green"]] },
+    held: [[0, "limit", "free"], [0.03, "leader", "follows"]], skies: [], signals: { 3: [[0, "red"], [2, "green"]] },
     collisions: [{ at_s: 0.02, counted: false }, { at_s: 0.04, counted: true }],
   };
   const quantisation = { tick_s: 0.02, perceived_s: 0.1, thought_s: 0.1 };

@@ -206,6 +206,21 @@ class ManyWorlds(unittest.TestCase):
             np.testing.assert_array_equal(final["action_mask"].astype(bool), info["final_info"]["action_mask"][world])
             np.testing.assert_array_equal(final["action_mask"].astype(bool), plain.action_masks()[world])
 
+    def test_the_infos_of_two_episodes_are_apart(self):
+        env = avastra.gym.VectorEnv(2, SPACE, "crossroad", autoreset_mode="SAME_STEP")
+        _, info = env.reset(seed=3)
+        begun, ended = info["seed"].tolist(), np.zeros(2, dtype=bool)
+        while not ended.any():
+            _, _, terminated, truncated, info = env.step(env.action_masks().argmax(axis=1))
+            ended = terminated | truncated
+        for world in np.flatnonzero(ended):
+            final = info["final_info"]
+            self.assertEqual(int(final["seed"][world]), begun[world])
+            self.assertTrue(final["_ended"][world])
+            self.assertNotEqual(int(info["seed"][world]), begun[world])
+            # What only the end of an episode tells stands with the end alone.
+            self.assertFalse(np.any(info.get("_ended", np.zeros(2, dtype=bool))[world]))
+
     def test_modes_have_names_and_options_are_known(self):
         for mode in AutoresetMode:
             for name in (mode, mode.name, mode.value):

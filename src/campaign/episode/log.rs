@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use avastra_drivers::external::{Conversation, Failure, FailureKind};
-use avastra_drivers::{ModularConfig, Reason, Status};
+use avastra_drivers::{Force, ModularConfig, Reason, Status};
 use avastra_lang::model::vocabulary::Verb;
 use avastra_lang::model::{BodyWord, Memory, Space};
 use avastra_search::mdp::{PerceptionCounts, StateVector};
@@ -74,6 +74,11 @@ impl Held {
     /// In a few words, for example `follow 3`.
     pub fn text(&self) -> String {
         self.reason.in_words(self.reported.as_deref())
+    }
+
+    /// How much it holds the speed back.
+    pub fn force(&self) -> Force {
+        self.reason.force()
     }
 }
 

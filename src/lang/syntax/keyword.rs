@@ -45,6 +45,15 @@ pub const DECLARATIONS: &[Keyword] = &[
     ("override", "Stands in place of the declaration of that kind and name in a used file."),
 ];
 
+/// The keywords of declarations that cannot be names: each ends every expression before it.
+pub const DECLARING: &[&str] = &[
+    "language", "use", "enum", "odds", "state", "let", "fn", "action", "group", "optional", "rule",
+    "require", "verdict", "scenario", "policy", "override",
+];
+
+/// The words in expressions that an operand follows, or what a `match` chooses by.
+pub const BEFORE_OPERANDS: &[&str] = &["and", "or", "not", "in", "implies", "match", "where"];
+
 /// Keywords that begin or join parts of a declaration.
 pub const CLAUSES: &[Keyword] = &[
     ("digest", "The content that a used file must have: `use \"a.ava\" digest \"sha256:…\"`."),
@@ -179,6 +188,7 @@ mod tests {
         // `on … also` and `each step` begin one, too.
         let begins = words_of("declaration_keyword");
         assert_eq!(begins, declarations.union(&BTreeSet::from(["on", "each", "step"])).copied().collect());
+        assert_eq!(words_of("declaring_word"), DECLARING.iter().copied().collect());
         let (no_name, no_unit) = (words_of("declaring_word"), words_of("unit_stop"));
         assert!(no_name.is_subset(&declarations), "{no_name:?}");
         assert!(no_unit.iter().all(|word| meaning(word).is_some()), "{no_unit:?}");

@@ -6,6 +6,7 @@
 //! and bounds its memory. Texts and comments are skipped by the same rules as in `ava.pest`.
 
 use crate::syntax::ast::{FileId, Span};
+use crate::syntax::keyword::{BEFORE_OPERANDS, DECLARING};
 use crate::syntax::{DEPTH_MAX, Diagnostic, TOKENS_MAX, code};
 
 /// A `//` comment, markers included, up to but without the line break.
@@ -146,15 +147,11 @@ impl Scanner<'_> {
         let end = rest.find(|next: char| !(next.is_ascii_alphanumeric() || next == '_'));
         self.at = end.map_or(self.text.len(), |end| start + end);
         let word = &self.text[start..self.at];
-        self.after_operand = !matches!(word, "and" | "or" | "not" | "in" | "implies" | "match" | "where");
-        match word {
-            "match" => self.opens_match(self.span(start)),
-            // A word that begins a declaration ends every expression.
-            "language" | "use" | "enum" | "odds" | "state" | "let" | "fn" | "action" | "group"
-            | "optional" | "rule" | "require" | "verdict" | "scenario" | "policy" | "override" => {
-                self.open_matches = 0;
-            }
-            _ => {}
+        self.after_operand = !BEFORE_OPERANDS.contains(&word);
+        if word == "match" {
+            self.opens_match(self.span(start));
+        } else if DECLARING.contains(&word) {
+            self.open_matches = 0;
         }
     }
 

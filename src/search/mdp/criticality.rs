@@ -174,7 +174,7 @@ pub struct LeastEncroachment {
     others: Vec<Trail>,
 }
 
-/// The outlines of an obstacle, every 0.1 s.
+/// The outlines of an obstacle, every 0.1 s. One that was on another level in between has a trail before and one after.
 #[derive(Debug, Clone)]
 struct Trail {
     id: u32,
@@ -191,13 +191,15 @@ impl LeastEncroachment {
         let frame = self.ego.len();
         self.ego.push(world.ego_outline());
         for obstacle in world.obstacles_on_level() {
-            match self.others.iter_mut().find(|trail| trail.id == obstacle.id) {
-                Some(trail) => trail.outlines.push(obstacle.outline),
-                None => {
-                    let outlines = vec![obstacle.outline];
-                    self.others.push(Trail { id: obstacle.id, begin: frame, outlines });
-                }
-            }
+            self.lengthen(obstacle.id, frame, obstacle.outline);
+        }
+    }
+
+    fn lengthen(&mut self, id: u32, frame: usize, outline: OrientedBox) {
+        let goes_on = |trail: &&mut Trail| trail.id == id && trail.begin + trail.outlines.len() == frame;
+        match self.others.iter_mut().find(goes_on) {
+            Some(trail) => trail.outlines.push(outline),
+            None => self.others.push(Trail { id, begin: frame, outlines: vec![outline] }),
         }
     }
 
@@ -278,13 +280,14 @@ mod tests {
         let mut encroachment = LeastEncroachment::default();
         let outline = |x_m, y_m, heading_rad| OrientedBox::new(Pose::new(x_m, y_m, heading_rad), 4.0, 2.0);
         let upwards_rad = core::f64::consts::FRAC_PI_2;
-        let mut outlines = Vec::new();
         for frame in 0..80 {
             let driven_m = f64::from(frame);
             encroachment.ego.push(outline(driven_m - 20.0, 0.0, 0.0));
-            outlines.push(outline(0.0, driven_m - 50.0, upwards_rad));
+            // For a while it is below the ego vehicle's road.
+            if !(10..20).contains(&frame) {
+                encroachment.lengthen(3, frame as usize, outline(0.0, driven_m - 50.0, upwards_rad));
+            }
         }
-        encroachment.others.push(Trail { id: 3, begin: 0, outlines });
         // The rear leaves x = 1 m in frame 23; the front reaches y = -1 m in frame 47.
         let found_s = encroachment.least_s(&|_| false).unwrap();
         assert!((found_s - 2.4).abs() < 0.11, "{found_s}");

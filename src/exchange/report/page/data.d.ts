@@ -6,6 +6,8 @@ export type Column = number;
 export type Places = [Column, Column, Column];
 /** From a tick or a time (s) on: what. */
 export type Changes<T> = [number, T][];
+/** How much a reason holds the speed back: it brakes hard, comes to a stop, follows somebody, or drives freely. */
+export type Force = "hard" | "stops" | "follows" | "free";
 
 export interface Header {
   summary: Summary;
@@ -15,7 +17,7 @@ export interface Header {
   step_s: number;
   collisions: Collision[];
   steps: Step[];
-  held: Changes<string>;
+  held: [number, string, Force][];
   ego: Ego;
   obstacles: Obstacle[];
   tracks: Track[];

@@ -200,12 +200,12 @@ export class Recording {
 
   /**
    * The latest entry of a list of `[from, …]` at a time or tick.
-   * @template T
-   * @param {Changes<T>} list
+   * @template {[number, ...unknown[]]} Entry
+   * @param {Entry[]} list
    * @param {number} at
    */
   latest(list, at) {
-    /** @type {[number, T] | null} */
+    /** @type {Entry | null} */
     let found = null;
     for (const entry of list) {
       if (entry[0] > at + 1e-6) break;

@@ -247,9 +247,9 @@ function drawReasons({ canvas, axis, recording, top, height }) {
   const { held } = recording.header;
   context.font = "11px system-ui, sans-serif";
   context.textBaseline = "middle";
-  held.forEach(([from, text], i) => {
+  held.forEach(([from, text, force], i) => {
     const [left, right] = [axis.xOf(from), axis.xOf(held[i + 1]?.[0] ?? recording.endS)];
-    context.fillStyle = reasonColour(text, colours);
+    context.fillStyle = forceColour(force, colours);
     context.fillRect(left, top, Math.max(right - left - 0.5, 0.5), height);
     if (right - left > context.measureText(text).width + 6) {
       context.fillStyle = colours.ink;
@@ -317,13 +317,16 @@ function median(numbers) {
   return sorted[Math.floor(sorted.length / 2)] ?? 0;
 }
 
-/** A reason has one colour everywhere; what makes it brake hard is red. */
-export function reasonColour(text, colours) {
-  if (/^(emergency|stop after|fallback|degraded)/.test(text))
-    return `color-mix(in srgb, ${colours.danger} 45%, ${colours.paper})`;
-  if (/^(stop|red light|crosswalk|yield|creep|approach|keep clear)/.test(text))
-    return `color-mix(in srgb, ${colours.warn} 40%, ${colours.paper})`;
-  if (/^(follow|nudge|lane change|sight)/.test(text))
-    return `color-mix(in srgb, ${colours.accent} 28%, ${colours.paper})`;
-  return `color-mix(in srgb, ${colours.muted} 18%, ${colours.paper})`;
+/**
+ * @param {import("./data").Force} force
+ * @param {Record<string, string>} colours
+ */
+function forceColour(force, colours) {
+  const [colour, share] = {
+    hard: [colours.danger, 45],
+    stops: [colours.warn, 40],
+    follows: [colours.accent, 28],
+    free: [colours.muted, 18],
+  }[force];
+  return `color-mix(in srgb, ${colour} ${share}%, ${colours.paper})`;
 }

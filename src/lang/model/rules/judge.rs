@@ -222,14 +222,17 @@ impl<'a> RowRules<'a> {
             }
         }
         let facts = Facts { spawn, ..self.facts(candidate) };
-        let value = |expr: &Expr| self.space.show(evaluate(expr, &self.space.functions, &facts), expr.ty);
-        // What was measured, to a thousandth of its unit.
-        let measured = |expr: &Expr| match evaluate(expr, &self.space.functions, &facts) {
+        let to = |per_unit: f64, expr: &Expr| match evaluate(expr, &self.space.functions, &facts) {
             Value::Number(number) => {
-                self.space.show(Value::Number((number * 1000.0).round() / 1000.0), expr.ty)
+                let rounded = (number * per_unit).round() / per_unit;
+                let shown = if rounded.is_finite() { rounded } else { number };
+                self.space.show(Value::Number(shown), expr.ty)
             }
             other => self.space.show(other, expr.ty),
         };
+        // What is computed, without the digits that binary fractions leave; what was measured, to a thousandth of its unit.
+        let value = |expr: &Expr| to(1e9, expr);
+        let measured = |expr: &Expr| to(1e3, expr);
         let is_known = |expr: &Expr| evaluate(expr, &self.space.functions, &facts).number().is_finite();
         let name = |who: Who| &self.space.bearers[who.bearer(candidate.values)];
         condition.walk(&mut |part| {

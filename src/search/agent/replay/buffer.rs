@@ -108,7 +108,7 @@ impl Replay {
         bytes: &mut Reader<'_>,
     ) -> Option<Replay> {
         let (count, next) = (bytes.u64()?, bytes.u64()?);
-        let is_priority = |value: &f64| *value >= 0.0 && value.is_finite();
+        let is_priority = |value: &f64| *value > 0.0 && value.is_finite();
         let priority_max = Some(bytes.f64s(1)?[0]).filter(is_priority)?;
         let is_place = |next: &usize| *next < settings.replay_capacity;
         let next = usize::try_from(next).ok().filter(is_place)?;
@@ -301,7 +301,7 @@ mod tests {
             bytes
         };
         for priority in [one, largest] {
-            for broken in [f64::NAN, f64::INFINITY, -1.0] {
+            for broken in [f64::NAN, f64::INFINITY, -1.0, 0.0] {
                 let bytes = with(place(priority.to_le_bytes()), broken.to_le_bytes());
                 assert!(restored(&bytes).is_none(), "{broken} for {priority}");
             }
