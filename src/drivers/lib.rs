@@ -55,4 +55,4 @@ pub use reactive::Reactive;
 pub use reference::{CarefulHuman, Evasion, FuzzySafety, Idm, MinimalPerformance, Reference, Rss, in_sight};
 pub use registry::{Entry, REGISTRY, by_name, seeing};
 pub use selected::{EXTERNAL, NoSettings, Selected};
-pub use status::{Force, GHOST_ID_MIN, Manoeuvre, PerceivedObject, Reason, Status};
+pub use status::{GHOST_ID_MIN, Manoeuvre, PerceivedObject, Reason, Restraint, Status};

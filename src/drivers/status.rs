@@ -151,7 +151,7 @@ pub enum Reason {
 /// How much a reason holds the speed back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Force {
+pub enum Restraint {
     /// It brakes as hard as it can, or drives no farther.
     Hard,
     /// It comes to a stop, or goes slowly until a way is free.
@@ -193,9 +193,9 @@ impl Reason {
     }
 
     /// How much it holds the speed back.
-    pub fn force(self) -> Force {
+    pub fn restraint(self) -> Restraint {
         match self {
-            Reason::Emergency(_) | Reason::Contact | Reason::Fallback | Reason::Degraded => Force::Hard,
+            Reason::Emergency(_) | Reason::Contact | Reason::Fallback | Reason::Degraded => Restraint::Hard,
             Reason::Stop(_)
             | Reason::StopSign
             | Reason::RedLight
@@ -203,9 +203,9 @@ impl Reason {
             | Reason::Yield(_)
             | Reason::Creep
             | Reason::Approach
-            | Reason::KeepClear => Force::Stops,
-            Reason::Follow(_) | Reason::LaneChange | Reason::Sight => Force::Follows,
-            Reason::Start | Reason::Cruise | Reason::Reported => Force::Free,
+            | Reason::KeepClear => Restraint::Stops,
+            Reason::Follow(_) | Reason::LaneChange | Reason::Sight => Restraint::Follows,
+            Reason::Start | Reason::Cruise | Reason::Reported => Restraint::Free,
         }
     }
 

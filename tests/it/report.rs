@@ -138,7 +138,7 @@ fn a_page_says_what_the_world_did() {
         assert_eq!(told["at_s"], was.contact.time_s);
         assert_eq!(told["ways"].as_array().unwrap().len(), 4, "four reference drivers");
     }
-    let held = log.held.iter().map(|held| serde_json::json!([held.from_s, held.text(), held.force()]));
+    let held = log.held.iter().map(|held| serde_json::json!([held.from_s, held.text(), held.restraint()]));
     assert_eq!(header["held"], held.collect::<Value>());
     assert_eq!(header["source"], SOURCE);
     let (ground, lines) = unpacked(&html, "g0");

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use avastra_drivers::external::{Conversation, Failure, FailureKind};
-use avastra_drivers::{Force, ModularConfig, Reason, Status};
+use avastra_drivers::{ModularConfig, Reason, Restraint, Status};
 use avastra_lang::model::vocabulary::Verb;
 use avastra_lang::model::{BodyWord, Memory, Space};
 use avastra_search::mdp::{PerceptionCounts, StateVector};
@@ -77,8 +77,8 @@ impl Held {
     }
 
     /// How much it holds the speed back.
-    pub fn force(&self) -> Force {
-        self.reason.force()
+    pub fn restraint(&self) -> Restraint {
+        self.reason.restraint()
     }
 }
 

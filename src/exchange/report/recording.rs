@@ -197,7 +197,7 @@ fn played(
     let header = json!({
         "summary": summary, "origin": origin(table, scenario, ads), "source": source, "rows": table.rows().iter().map(|row| &row.label).collect::<Vec<_>>(),
         "step_s": table.space().episode.step_s, "collisions": collisions, "steps": steps,
-        "held": log.held.iter().map(|held| json!([held.from_s, held.text(), held.force()])).collect::<Vec<_>>(),
+        "held": log.held.iter().map(|held| json!([held.from_s, held.text(), held.restraint()])).collect::<Vec<_>>(),
         "ego": ego(&recorder.ego, &mind, &mut columns), "obstacles": obstacles(table, &log, &recorder, &mut columns),
         "tracks": mind.tracks(&mut columns), "plans": mind.plans(&mut columns),
         "margins": margins(table, &log, &episode::margins_over_time(&setup, &log), &mut columns),

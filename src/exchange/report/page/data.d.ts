@@ -7,7 +7,7 @@ export type Places = [Column, Column, Column];
 /** From a tick or a time (s) on: what. */
 export type Changes<T> = [number, T][];
 /** How much a reason holds the speed back: it brakes hard, comes to a stop, follows somebody, or drives freely. */
-export type Force = "hard" | "stops" | "follows" | "free";
+export type Restraint = "hard" | "stops" | "follows" | "free";
 
 export interface Header {
   summary: Summary;
@@ -17,7 +17,7 @@ export interface Header {
   step_s: number;
   collisions: Collision[];
   steps: Step[];
-  held: [number, string, Force][];
+  held: [number, string, Restraint][];
   ego: Ego;
   obstacles: Obstacle[];
   tracks: Track[];

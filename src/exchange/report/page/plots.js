@@ -247,9 +247,9 @@ function drawReasons({ canvas, axis, recording, top, height }) {
   const { held } = recording.header;
   context.font = "11px system-ui, sans-serif";
   context.textBaseline = "middle";
-  held.forEach(([from, text, force], i) => {
+  held.forEach(([from, text, restraint], i) => {
     const [left, right] = [axis.xOf(from), axis.xOf(held[i + 1]?.[0] ?? recording.endS)];
-    context.fillStyle = forceColour(force, colours);
+    context.fillStyle = restraintColour(restraint, colours);
     context.fillRect(left, top, Math.max(right - left - 0.5, 0.5), height);
     if (right - left > context.measureText(text).width + 6) {
       context.fillStyle = colours.ink;
@@ -318,15 +318,15 @@ function median(numbers) {
 }
 
 /**
- * @param {import("./data").Force} force
+ * @param {import("./data").Restraint} restraint
  * @param {Record<string, string>} colours
  */
-function forceColour(force, colours) {
+function restraintColour(restraint, colours) {
   const [colour, share] = {
     hard: [colours.danger, 45],
     stops: [colours.warn, 40],
     follows: [colours.accent, 28],
     free: [colours.muted, 18],
-  }[force];
+  }[restraint];
   return `color-mix(in srgb, ${colour} ${share}%, ${colours.paper})`;
 }
