@@ -51,9 +51,6 @@ pub const DECLARING: &[&str] = &[
     "require", "verdict", "scenario", "policy", "override",
 ];
 
-/// The words in expressions that an operand follows, or what a `match` chooses by.
-pub const BEFORE_OPERANDS: &[&str] = &["and", "or", "not", "in", "implies", "match", "where"];
-
 /// Keywords that begin or join parts of a declaration.
 pub const CLAUSES: &[Keyword] = &[
     ("digest", "The content that a used file must have: `use \"a.ava\" digest \"sha256:…\"`."),

@@ -6,7 +6,7 @@
 //! and bounds its memory. Texts and comments are skipped by the same rules as in `ava.pest`.
 
 use crate::syntax::ast::{FileId, Span};
-use crate::syntax::keyword::{BEFORE_OPERANDS, DECLARING};
+use crate::syntax::keyword::{DECLARING, OPERATORS};
 use crate::syntax::{DEPTH_MAX, Diagnostic, TOKENS_MAX, code};
 
 /// A `//` comment, markers included, up to but without the line break.
@@ -147,7 +147,8 @@ impl Scanner<'_> {
         let end = rest.find(|next: char| !(next.is_ascii_alphanumeric() || next == '_'));
         self.at = end.map_or(self.text.len(), |end| start + end);
         let word = &self.text[start..self.at];
-        self.after_operand = !BEFORE_OPERANDS.contains(&word);
+        let is_operator = OPERATORS.iter().any(|(operator, _)| *operator == word);
+        self.after_operand = !is_operator && !matches!(word, "match" | "where");
         if word == "match" {
             self.opens_match(self.span(start));
         } else if DECLARING.contains(&word) {
