@@ -22,7 +22,6 @@ use super::load;
 use super::look;
 use super::output::{Output, plural};
 use super::parallel::each_file;
-use super::replay::priority_text;
 
 /// Says which module is at fault for what every file is about: its first counted collision, or else the first breach that it
 /// claims. Or, with
@@ -237,9 +236,10 @@ fn told(table: &ActionTable, log: &EpisodeLog, found: Found) -> (String, serde_j
     match found {
         Found::Collision(index) => {
             let collision = &log.collisions[index];
-            let Contact { obstacle, time_s, priority, .. } = collision.contact;
+            let Contact { obstacle, time_s, ruling, .. } = collision.contact;
+            let priority = ruling.priority;
             let body = table.space().body_name(collision.body);
-            let (verb, first) = (collision.verb.name(), priority_text(priority));
+            let (verb, first) = (collision.verb.name(), ruling.describe());
             let heading = format!("{body} npc#{obstacle} ({verb}) is hit at {time_s:.2} s; {first}");
             let priority = priority.name();
             (heading, serde_json::json!({ "obstacle": obstacle, "time_s": time_s, "priority": priority }))

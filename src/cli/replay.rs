@@ -7,7 +7,7 @@ use avastra_campaign::oracle;
 use avastra_campaign::run::{Asked, Gauges, Stage};
 use avastra_drivers::Selected;
 use avastra_lang::check::Loaded;
-use avastra_lang::model::vocabulary::{Priority, Word};
+use avastra_lang::model::vocabulary::Word;
 use avastra_lang::model::{Avoidability, Policy, RequirementDef, Scenario, Space};
 use avastra_world::action::ActionTable;
 
@@ -169,7 +169,7 @@ fn play(
     let (criticality, pet_s) = gauges.of_steps(&log);
     let severities: Vec<oracle::Severity> = log.collisions.iter().map(oracle::severity).collect();
     let priorities: Vec<&str> =
-        log.collisions.iter().map(|collision| collision.contact.priority.name()).collect();
+        log.collisions.iter().map(|collision| collision.contact.ruling.priority.name()).collect();
     let started = ads.program().filter(|program| program.can_start()).map(|program| program.attached());
     let doubted = started.filter(|attached| !attached.is_deterministic()).map(|attached| attached.name());
     let claims = other.is_none().then(|| {
@@ -262,17 +262,8 @@ fn severity_text(
         severity.closing_speed_mps,
         severity.delta_v_mps,
         severity.obstacle_delta_v_mps,
-        priority_text(collision.contact.priority)
+        collision.contact.ruling.describe()
     )
-}
-
-/// Who had to give way, in words.
-pub fn priority_text(priority: Priority) -> &'static str {
-    match priority {
-        Priority::Ego => "the ego vehicle had priority",
-        Priority::Other => "the other had priority",
-        Priority::None => "neither had priority",
-    }
 }
 
 fn report(output: &Output, path: &Path, name: &str, verdicts: &[oracle::ClaimResult]) {

@@ -488,7 +488,7 @@ fn an_ambulance_passes_red_lights_and_is_the_only_one_that_does() {
         };
         let mut is_running = false;
         let log = run.play(episode, &mut choose, &mut |world, _, _| {
-            is_running |= world.obstacles().any(|other| world.runs_red(other.id));
+            is_running |= world.obstacles().any(|other| world.runs(other.id));
         });
         assert_replays(&run, episode, &log);
         ran_red += usize::from(is_running);
@@ -511,13 +511,13 @@ fn who_runs_into_a_siren_had_to_wait() {
             let mut is_running = false;
             let log = run.play(episode, &mut choose, &mut |world, _, _| {
                 assert_eq!(world.moment_facts().rule_breakers, 0);
-                is_running |= world.obstacles().any(|other| world.runs_red(other.id));
+                is_running |= world.obstacles().any(|other| world.runs(other.id));
             });
             assert_replays(&run, episode, &log);
             ran_red += usize::from(is_running);
             for collision in &log.collisions {
-                assert_ne!(collision.contact.priority, Priority::Ego, "{ads}: {collision:?}");
-                hit += usize::from(collision.contact.priority == Priority::Other);
+                assert_ne!(collision.contact.ruling.priority, Priority::Ego, "{ads}: {collision:?}");
+                hit += usize::from(collision.contact.ruling.priority == Priority::Other);
             }
         }
     }

@@ -273,7 +273,7 @@ fn of_collision(finding: &Finding) -> Vec<Expect> {
     });
     let class = tree::name(finding.judgement.class.name());
     expects.push(tree::expect(class, by.into_iter().chain([obstacle()]).collect()));
-    let priority = tree::name(contact.priority.name());
+    let priority = tree::name(contact.ruling.priority.name());
     expects.push(tree::expect(tree::equal(tree::name("priority"), priority), vec![obstacle()]));
     if let Some([first, rest @ ..]) = finding.cause.as_deref() {
         let first = tree::name(first.name());
@@ -332,12 +332,13 @@ fn headline_of(space: &Space, log: &EpisodeLog, summary: &EpisodeSummary, about:
 fn headline(space: &Space, log: &EpisodeLog, collision: &Collision) -> String {
     let contact = &collision.contact;
     format!(
-        "{} npc#{} ({}) is hit at {:.2} s by an ego vehicle at {:.1} km/h on {}.",
+        "{} npc#{} ({}) is hit at {:.2} s by an ego vehicle at {:.1} km/h on {}. Priority: {}.",
         space.body_name(collision.body),
         contact.obstacle,
         collision.verb.name(),
         contact.time_s,
         contact.ego_speed_mps * 3.6,
-        log.road
+        log.road,
+        contact.ruling.describe()
     )
 }

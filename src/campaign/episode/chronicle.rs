@@ -116,12 +116,14 @@ impl Chronicle {
 
     /// The world after a tick of a step, in which these contacts began.
     pub fn note(&mut self, setup: &Setup, step: usize, memory: &Memory, world: &World, contacts: &[Contact]) {
+        // The tick of the first contact is judged, too: some requirements are broken by it.
+        let is_whole = self.collisions.is_empty();
         for &contact in contacts {
             self.collisions.push(self.collision(world, contact, step));
         }
         self.incidents.extend_from_slice(world.incidents());
         self.trails.note(world);
-        if let Some(monitor) = self.monitor.as_mut().filter(|_| self.collisions.is_empty()) {
+        if let Some(monitor) = self.monitor.as_mut().filter(|_| is_whole) {
             monitor.judge(setup, (world, &self.own_bodies), memory, step);
         }
         self.distance_m += world.ego().speed_mps * DT_S;

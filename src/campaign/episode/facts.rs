@@ -23,13 +23,14 @@ const SIDEWAYS_MPS: f64 = 0.1;
 
 /// The facts about a collision; `before` are the earlier ones of the episode.
 pub fn collision_facts(collision: &Collision, before: &[Collision]) -> OutcomeFacts {
+    let ruling = &collision.contact.ruling;
     OutcomeFacts {
         collision: true,
         repeated: before.iter().any(|other| other.contact.obstacle == collision.contact.obstacle),
-        sudden: collision.contact.time_s - collision.spawned_s <= SUDDEN_S,
-        struck: collision.contact.priority != Priority::Other
-            && struck(&collision.contact, &VehicleParameters::MKZ),
-        priority: collision.contact.priority,
+        // No excuse covers an ego vehicle that was not allowed to be there.
+        sudden: !ruling.is_ego_wrong() && collision.contact.time_s - collision.spawned_s <= SUDDEN_S,
+        struck: !ruling.is_ego_wrong() && struck(&collision.contact, &VehicleParameters::MKZ),
+        priority: ruling.priority,
         // What was hit was nearest, and contact is certainty.
         hit: Some(collision.body),
         near: Some(collision.body),
@@ -70,7 +71,7 @@ pub fn struck(contact: &Contact, ego: &VehicleParameters) -> bool {
 /// Whether another vehicle came from behind and ran into the rear of an ego vehicle that had priority.
 pub fn run_into_from_behind(contact: &Contact, ego: &VehicleParameters) -> bool {
     let other = contact.obstacle_velocity_on_ego_mps;
-    contact.priority == Priority::Ego
+    contact.ruling.priority == Priority::Ego
         && matches!(outline_side(contact.on_ego, ego), OutlineSide::Rear)
         && other.x > contact.ego_speed_mps
         && other.x > other.y.abs()
@@ -79,7 +80,7 @@ pub fn run_into_from_behind(contact: &Contact, ego: &VehicleParameters) -> bool 
 /// Whether the ego vehicle is at fault in a contact: it had to give way, or where neither had, it ran into the
 /// obstacle.
 pub fn at_fault(contact: &Contact) -> bool {
-    match contact.priority {
+    match contact.ruling.priority {
         Priority::Other => true,
         Priority::Ego => false,
         Priority::None => !struck(contact, &VehicleParameters::MKZ),
@@ -134,6 +135,7 @@ mod tests {
     use crate::episode::{PreCrash, Shape};
     use avastra_lang::model::BodyWord;
     use avastra_lang::model::vocabulary::{Body, Priority, Verb};
+    use avastra_world::sim::Ruling;
 
     fn collision(x_m: f64, y_m: f64, ego_speed_mps: f64, (ahead_mps, left_mps): (f64, f64)) -> Collision {
         let contact = Contact {
@@ -145,7 +147,7 @@ mod tests {
             obstacle_velocity_mps: Vec2::new(ahead_mps, left_mps),
             obstacle_velocity_on_ego_mps: Vec2::new(ahead_mps, left_mps),
             closing_speed_mps: 1.0,
-            priority: Priority::None,
+            ruling: Ruling::default(),
         };
         Collision {
             shape: Shape::Straight,
@@ -196,7 +198,7 @@ mod tests {
         let flank = collision(0.0, 1.03, 8.0, (8.0, -0.5));
         for (priority, expected) in [(Priority::None, true), (Priority::Ego, true), (Priority::Other, false)]
         {
-            let contact = Contact { priority, ..flank.contact };
+            let contact = Contact { ruling: Ruling { priority, ..Ruling::default() }, ..flank.contact };
             let found = collision_facts(&Collision { contact, ..flank }, &[]);
             assert_eq!(found.struck, expected, "{priority:?}");
         }
@@ -206,7 +208,8 @@ mod tests {
     fn one_that_comes_from_behind_is_faster_and_meets_the_rear() {
         let mkz = VehicleParameters::MKZ;
         let is_so = |x_m: f64, velocity_mps: (f64, f64), priority: Priority| {
-            let contact = Contact { priority, ..collision(x_m, 0.0, 8.0, velocity_mps).contact };
+            let ruling = Ruling { priority, ..Ruling::default() };
+            let contact = Contact { ruling, ..collision(x_m, 0.0, 8.0, velocity_mps).contact };
             run_into_from_behind(&contact, &mkz)
         };
         assert!(is_so(-2.35, (12.0, 0.0), Priority::Ego));

@@ -37,6 +37,8 @@ const CHANGES_M: f64 = 2.0;
 const CHANGES_MPS: f64 = 1.0;
 /// What would be reached later than this is passed and not evaded, s: a driver's reaction and braking. Ours.
 const LATE_S: f64 = 2.5;
+/// A lead vehicle that has stood at so many steps has stopped, and is not stopping: two seconds. Ours.
+const STOOD_STEPS: usize = 5;
 /// One that has turned by more meanwhile drives through a bend or a junction, rad (20°). Ours.
 const EVADES_RAD: f64 = core::f64::consts::PI / 9.0;
 
@@ -173,24 +175,29 @@ impl Step {
 
 /// What somebody does beside driving on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Manoeuvre {
+pub(super) enum Manoeuvre {
     /// At a junction; a bend turns a vehicle, too, and is none.
     LeftTurn,
     RightTurn,
     LaneChange,
 }
 
-/// What somebody did in the last seconds: one step or more, the last one at the contact.
+/// What somebody did in the last seconds, and was about to do.
 #[derive(Debug, Clone)]
-pub(super) struct Way(pub Vec<Step>);
+pub(super) struct Way {
+    /// One or more, the last one at the contact.
+    pub steps: Vec<Step>,
+    /// What its route or its way has for it where it is, as far as that is known.
+    pub intends: Option<Manoeuvre>,
+}
 
 impl Way {
     fn now(&self) -> &Step {
-        &self.0[self.0.len() - 1]
+        &self.steps[self.steps.len() - 1]
     }
 
     fn from(&self) -> Place {
-        self.0[0].place
+        self.steps[0].place
     }
 
     fn to(&self) -> Place {
@@ -198,11 +205,11 @@ impl Way {
     }
 
     pub fn shape(&self) -> Shape {
-        self.shape_until(self.0.len() - 1)
+        self.shape_until(self.steps.len() - 1)
     }
 
     fn shape_until(&self, step: usize) -> Shape {
-        let (from, to) = (self.from(), self.0[step].place);
+        let (from, to) = (self.from(), self.steps[step].place);
         Shape::between((from.pose, from.speed_mps()), (to.pose, to.speed_mps()))
     }
 
@@ -212,19 +219,47 @@ impl Way {
             let way = pair[1].place.pose.position - pair[0].place.pose.position;
             way.dot(&(pair[0].left() + pair[1].left())) / 2.0
         };
-        self.0[from..=to].windows(2).map(across_m).sum()
+        self.steps[from..=to].windows(2).map(across_m).sum()
     }
 
     fn manoeuvre(&self) -> Option<Manoeuvre> {
-        self.manoeuvre_until(self.0.len() - 1)
+        self.intends.or_else(|| self.manoeuvre_until(self.steps.len() - 1))
+    }
+
+    /// Whether it turns, or is known to intend what it does.
+    fn means_to(&self) -> bool {
+        let turns = matches!(self.manoeuvre(), Some(Manoeuvre::LeftTurn | Manoeuvre::RightTurn));
+        self.intends.is_some() || turns
+    }
+
+    /// Whether it went aside as fast as in a lane change at some step up to this one.
+    fn goes_aside(&self, step: usize) -> bool {
+        let goes = |step: &Step| step.place.velocity_mps.dot(&step.left()).abs() > CHANGES_MPS;
+        self.steps[..=step].iter().any(goes)
+    }
+
+    /// Its heading as it came to the junction that it is in; if it has been in it all the time, at the beginning.
+    fn approach_rad(&self) -> f64 {
+        let before = self.steps.iter().rev().find(|step| !step.in_junction);
+        before.unwrap_or(&self.steps[0]).place.pose.heading_rad
+    }
+
+    /// Whether it has stood for the last seconds.
+    fn has_stood(&self) -> bool {
+        let last = self.steps.len().saturating_sub(STOOD_STEPS);
+        self.steps[last..].iter().all(|step| step.place.speed_mps() < STANDING_MPS)
     }
 
     fn manoeuvre_until(&self, step: usize) -> Option<Manoeuvre> {
-        let turns = self.0[..=step].iter().any(|step| step.in_junction);
+        let turns = self.steps[..=step].iter().any(|step| step.in_junction);
         match self.shape_until(step) {
             Shape::LeftTurn if turns => Some(Manoeuvre::LeftTurn),
             Shape::RightTurn if turns => Some(Manoeuvre::RightTurn),
-            _ => (self.aside_m(0, step).abs() > CHANGES_M).then_some(Manoeuvre::LaneChange),
+            _ => {
+                // One that goes aside slowly drifts, however far.
+                let changes = self.aside_m(0, step).abs() > CHANGES_M && self.goes_aside(step);
+                changes.then_some(Manoeuvre::LaneChange)
+            }
         }
     }
 
@@ -234,16 +269,15 @@ impl Way {
 
     /// Whether it goes aside on purpose, or has done so.
     fn changes_lanes(&self) -> bool {
-        let goes = |step: &Step| step.place.velocity_mps.dot(&step.left()).abs() > CHANGES_MPS;
         match self.manoeuvre() {
             Some(manoeuvre) => manoeuvre == Manoeuvre::LaneChange,
-            None => self.0.iter().any(goes),
+            None => self.goes_aside(self.steps.len() - 1),
         }
     }
 
     /// The step at which it skids.
     fn skids(&self) -> Option<usize> {
-        self.0.iter().position(|Step { place, .. }| {
+        self.steps.iter().position(|Step { place, .. }| {
             let course_rad = libm::atan2(place.velocity_mps.y, place.velocity_mps.x);
             let askew_rad = wrap_angle(course_rad - place.pose.heading_rad).abs();
             let is_skewed = askew_rad.min(core::f64::consts::PI - askew_rad) > SKIDS_RAD;
@@ -253,9 +287,9 @@ impl Way {
 
     /// The step at which it has left the road.
     fn leaves_road(&self) -> Option<usize> {
-        let was_on_it = |step: usize| self.0[..step].iter().any(|step| step.off_road_m <= 0.0);
-        (0..self.0.len()).find(|&step| {
-            let Step { off_road_m, in_junction, .. } = self.0[step];
+        let was_on_it = |step: usize| self.steps[..step].iter().any(|step| step.off_road_m <= 0.0);
+        (0..self.steps.len()).find(|&step| {
+            let Step { off_road_m, in_junction, .. } = self.steps[step];
             off_road_m > BESIDE_ROAD_M && !in_junction && was_on_it(step)
         })
     }
@@ -267,7 +301,7 @@ impl Way {
     /// Whether it leaves a place beside the lanes, or has come to one.
     fn parks(&self) -> bool {
         let is_beside = |step: &Step| step.off_road_m >= 0.0 && !step.in_junction;
-        let stood = self.0.iter().any(|step| is_beside(step) && step.place.speed_mps() < STANDING_MPS);
+        let stood = self.steps.iter().any(|step| is_beside(step) && step.place.speed_mps() < STANDING_MPS);
         let moves = self.to().speed_mps() >= STANDING_MPS;
         moves && (stood || is_beside(self.now()) && self.to().speed_mps() < PARKING_MPS)
     }
@@ -275,13 +309,13 @@ impl Way {
     /// The step from which it moves aside before somebody in its way, too late to pass; one that turns does not. `others`: where they
     /// were at each step.
     fn evades(&self, others: &[Vec<Place>]) -> Option<usize> {
-        (0..self.0.len()).find(|&step| {
-            let own = self.0[step].place;
+        (0..self.steps.len()).find(|&step| {
+            let own = self.steps[step].place;
             let turned_rad = wrap_angle(self.to().pose.heading_rad - own.pose.heading_rad).abs();
             if turned_rad > EVADES_RAD {
                 return false;
             }
-            let aside_m = self.aside_m(step, self.0.len() - 1).abs();
+            let aside_m = self.aside_m(step, self.steps.len() - 1).abs();
             let is_in_the_way = |other: &Place| {
                 let there = own.pose.to_local(other.pose.position);
                 let closing_mps = own.speed_mps() - own.pose.forward().dot(&other.velocity_mps);
@@ -349,7 +383,7 @@ impl Before {
             Body::Bicycle => {
                 return either(PreCrash::CyclistWithManoeuvre, PreCrash::CyclistWithoutManoeuvre);
             }
-            Body::Object if self.other.0.iter().any(|step| step.place.speed_mps() > MOVES_MPS) => {
+            Body::Object if self.other.steps.iter().any(|step| step.place.speed_mps() > MOVES_MPS) => {
                 return PreCrash::FallingLoad;
             }
             Body::Object => return either(PreCrash::ObjectWithManoeuvre, PreCrash::ObjectWithoutManoeuvre),
@@ -362,11 +396,11 @@ impl Before {
             return kind;
         }
         // Before a junction each looks where it comes from; along a bend those who are apart look elsewhere than where they meet.
-        let (ego_pose, other_pose) = match self.in_junction {
-            true => (self.ego.from().pose, self.other.from().pose),
-            false => (self.ego.to().pose, self.other.to().pose),
+        let (ego_rad, other_rad) = match self.in_junction {
+            true => (self.ego.approach_rad(), self.other.approach_rad()),
+            false => (self.ego.to().pose.heading_rad, self.other.to().pose.heading_rad),
         };
-        let apart_rad = wrap_angle(other_pose.heading_rad - ego_pose.heading_rad).abs();
+        let apart_rad = wrap_angle(other_rad - ego_rad).abs();
         if apart_rad < ALIKE_RAD {
             return self.same_direction(turns_left || turns_right);
         }
@@ -374,7 +408,8 @@ impl Before {
         match (is_opposite, self.is_signalized) {
             (true, true) if turns_left => PreCrash::LeftTurnAcrossPathSignalized,
             (true, false) if turns_left => PreCrash::LeftTurnAcrossPath,
-            (true, _) if [ego, other].iter().any(Option::is_some) => PreCrash::ManoeuvreOppositeDirection,
+            // One that comes over without meaning to change lanes drifts.
+            (true, _) if ego.is_some() || self.other.means_to() => PreCrash::ManoeuvreOppositeDirection,
             (true, _) => PreCrash::NoManoeuvreOppositeDirection,
             (false, true) if turns_right => PreCrash::RightTurnSignalized,
             (false, false) if turns_left || turns_right => PreCrash::TurningNonSignalized,
@@ -400,7 +435,7 @@ impl Before {
     fn leaves_road(&self) -> Option<PreCrash> {
         self.motor_vehicles().find_map(|way| {
             let step = way.leaves_road()?;
-            let place = way.0[step].place;
+            let place = way.steps[step].place;
             match () {
                 () if place.ahead_mps() < -MOVES_MPS => Some(PreCrash::RoadDepartureBacking),
                 () if place.speed_mps() < PARKING_MPS => None,
@@ -420,7 +455,7 @@ impl Before {
 
     /// Whether one of them was beside the way of the other.
     fn came_over(&self) -> bool {
-        let whole_m = |way: &Way| way.aside_m(0, way.0.len() - 1);
+        let whole_m = |way: &Way| way.aside_m(0, way.steps.len() - 1);
         let now_m: f64 =
             (self.other.to().pose.position - self.ego.to().pose.position).dot(&self.ego.now().left());
         let came_m = whole_m(&self.other) - whole_m(&self.ego);
@@ -448,7 +483,7 @@ impl Before {
         }
         let (before_mps, after_mps) = (lead.from().speed_mps(), lead.to().speed_mps());
         match after_mps - before_mps {
-            _ if before_mps.max(after_mps) < STANDING_MPS => PreCrash::LeadStopped,
+            _ if before_mps.max(after_mps) < STANDING_MPS || lead.has_stood() => PreCrash::LeadStopped,
             change_mps if change_mps < -CONSTANT_MPS => PreCrash::LeadDecelerating,
             change_mps if change_mps > CONSTANT_MPS => PreCrash::LeadAccelerating,
             _ if after_mps < STANDING_MPS => PreCrash::LeadStopped,
@@ -470,7 +505,7 @@ mod tests {
     fn way(places: &[Place]) -> Way {
         let step =
             |place: &Place| Step { place: *place, off_road_m: -1.5, in_junction: false, lane_rad: 0.0 };
-        Way(places.iter().map(step).collect())
+        Way { steps: places.iter().map(step).collect(), intends: None }
     }
 
     /// The ego vehicle drives 50 m along +x at 10 m/s; in town, at no junction.
@@ -493,15 +528,15 @@ mod tests {
     /// The same at a junction.
     fn at_junction(mut before: Before) -> Before {
         before.in_junction = true;
-        before.ego.0.iter_mut().chain(&mut before.other.0).for_each(|step| step.in_junction = true);
+        before.ego.steps.iter_mut().chain(&mut before.other.steps).for_each(|step| step.in_junction = true);
         before
     }
 
     /// An overtaking vehicle comes from behind, and does this in between, 30 m and more ahead of where it began.
     fn along(middle: Step) -> Before {
         let mut before = before([at(-10.0, 0.0, 0.0, 15.0), at(54.0, 0.0, 0.0, 12.0)]);
-        before.ego.0.insert(1, Step { place: at(25.0, 0.0, 0.0, 10.0), ..before.ego.0[0] });
-        before.other.0.insert(1, middle);
+        before.ego.steps.insert(1, Step { place: at(25.0, 0.0, 0.0, 10.0), ..before.ego.steps[0] });
+        before.other.steps.insert(1, middle);
         before.third.push(Vec::new());
         before
     }
@@ -526,12 +561,12 @@ mod tests {
         // It comes over in front of the ego vehicle, which hits it with its front: on purpose, or slowly.
         let comes_over = |aside_mps: f64| {
             let mut comes = before([at(40.0, 3.5, 0.0, 8.0), at(54.0, 1.6, 0.0, 8.0)]);
-            comes.other.0[1].place.velocity_mps.y = -aside_mps;
+            comes.other.steps[1].place.velocity_mps.y = -aside_mps;
             comes.kind().number()
         };
         assert_eq!((comes_over(1.5), comes_over(0.6)), (Some(18), Some(19)));
         let mut swerve = before([at(40.0, 3.5, 0.0, 2.0), at(54.0, 3.5, 0.0, 2.0)]);
-        swerve.ego.0[1].place = at(50.0, 3.5, 0.0, 10.0);
+        swerve.ego.steps[1].place = at(50.0, 3.5, 0.0, 10.0);
         assert_eq!(swerve.kind(), PreCrash::FollowingVehicleManoeuvre);
     }
 
@@ -552,9 +587,9 @@ mod tests {
         assert_eq!(Before { is_signalized: true, ..left }.kind().number(), Some(27));
         // A bend is no turn, and who meet there come towards each other.
         let mut bend = before([at(74.0, 73.0, -90.0, 12.0), at(54.0, 24.7, -135.0, 12.0)]);
-        bend.ego.0[1].place = at(50.0, 20.7, 45.0, 10.0);
+        bend.ego.steps[1].place = at(50.0, 20.7, 45.0, 10.0);
         for way in [&mut bend.ego, &mut bend.other] {
-            way.0.iter_mut().for_each(|step| step.lane_rad = step.place.pose.heading_rad);
+            way.steps.iter_mut().for_each(|step| step.lane_rad = step.place.pose.heading_rad);
         }
         assert_eq!(bend.kind().number(), Some(21));
         let from_the_side = [at(60.0, -20.0, 90.0, 5.0), at(54.0, -1.0, 20.0, 5.0)];
@@ -570,7 +605,7 @@ mod tests {
             ..before([at(50.0, -5.0, 90.0, 1.5), at(50.0, 0.0, 90.0, 1.5)])
         };
         let mut turning = at_junction(walker.clone());
-        turning.ego.0[1].place = at(20.0, 20.0, 90.0, 5.0);
+        turning.ego.steps[1].place = at(20.0, 20.0, 90.0, 5.0);
         for (body, numbers) in
             [(Body::Pedestrian, (11, 12)), (Body::Bicycle, (13, 14)), (Body::Animal, (9, 10))]
         {
@@ -593,21 +628,21 @@ mod tests {
         let skids = Step { place: Place { pose: skewed, ..street.place }, ..street };
         assert_eq!(along(skids).kind().number(), Some(3));
         let mut after_a_change = along(Step { place: Place { pose: skewed, ..street.place }, ..street });
-        after_a_change.other.0[0].place = at(-10.0, 3.5, 0.0, 15.0);
-        after_a_change.other.0.insert(1, Step { place: at(10.0, 0.0, 0.0, 15.0), ..street });
+        after_a_change.other.steps[0].place = at(-10.0, 3.5, 0.0, 15.0);
+        after_a_change.other.steps.insert(1, Step { place: at(10.0, 0.0, 0.0, 15.0), ..street });
         assert_eq!(after_a_change.kind().number(), Some(2));
         let beside = Step { place: at(20.0, -3.0, 0.0, 15.0), off_road_m: 1.0, ..street };
         assert_eq!(along(beside).kind().number(), Some(7));
         assert_ne!(along(Step { in_junction: true, ..beside }).kind().number(), Some(7));
         let mut changed = along(beside);
-        changed.other.0.insert(1, Step { place: at(10.0, -3.5, 0.0, 15.0), ..street });
+        changed.other.steps.insert(1, Step { place: at(10.0, -3.5, 0.0, 15.0), ..street });
         assert_eq!(changed.kind().number(), Some(6));
         assert_eq!(along(Step { place: at(20.0, -3.0, 180.0, -5.0), ..beside }).kind().number(), Some(8));
 
         let backs = before([at(60.0, 0.0, 0.0, -2.0), at(54.0, 0.0, 0.0, -2.0)]);
         assert_eq!(backs.kind(), PreCrash::Backing);
         let mut parks = before([at(45.0, -3.0, 0.0, 0.0), at(54.0, 0.0, 10.0, 4.0)]);
-        parks.other.0[0].off_road_m = 0.8;
+        parks.other.steps[0].off_road_m = 0.8;
         assert_eq!(parks.kind(), PreCrash::Parking);
 
         // A vehicle beside the ego vehicle comes over because somebody stands before it: late, or in good time.

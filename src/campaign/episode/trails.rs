@@ -4,12 +4,12 @@ use core::ops::Range;
 use std::collections::VecDeque;
 
 use avastra_base::geometry::{Pose, wrap_angle};
-use avastra_lang::model::vocabulary::{BodyClass, TrafficRule};
-use avastra_road::{LaneIndex, LanePlace, RoadMap, SignKind};
+use avastra_lang::model::vocabulary::{BodyClass, RoadKind, TrafficRule, Turn};
+use avastra_road::{LaneIndex, LanePlace, RoadMap};
 use avastra_world::sim::{Contact, DT_S, Obstacle, Scene, SignalColour, VehicleParameters, World};
 
 use super::facts::side;
-use super::precrash::{Before, Place, PreCrash, Step, Way};
+use super::precrash::{Before, Manoeuvre, Place, PreCrash, Step, Way};
 use super::shape::Shape;
 
 /// How far back it is looked, s.
@@ -27,7 +27,6 @@ pub(super) struct Trails {
 struct Look {
     tick: u64,
     ego: Place,
-    ego_front_m: f64,
     red_runs: u32,
     others: Vec<(u32, Place)>,
 }
@@ -44,7 +43,6 @@ impl Trails {
         self.looks.push_back(Look {
             tick: world.ticks(),
             ego: ego_now(world),
-            ego_front_m: front_m(world),
             red_runs: world.red_runs(),
             others: world.obstacles().map(|obstacle| (obstacle.id, now(obstacle))).collect(),
         });
@@ -56,8 +54,9 @@ impl Trails {
         // The contact has changed the speeds already.
         let heading = world.ego().rear_axle.forward();
         let ego_ends = Place { velocity_mps: heading * contact.ego_speed_mps, ..ego_now(world) };
-        let way = |places: &mut dyn Iterator<Item = Place>, ends: Place| {
-            Way(places.chain([ends]).map(|place| step(map, place)).collect())
+        let way = |places: &mut dyn Iterator<Item = Place>, ends: Place| Way {
+            steps: places.chain([ends]).map(|place| step(map, place)).collect(),
+            intends: None,
         };
         let whole = way(&mut self.looks.iter().map(|look| look.ego), ego_ends).shape();
         let (Some(first), Some(obstacle)) = (self.looks.front(), world.obstacle(contact.obstacle)) else {
@@ -74,38 +73,34 @@ impl Trails {
         let others =
             |look: &Look| look.others.iter().filter(|other| !is_it(other)).map(|other| other.1).collect();
         let third = met.iter().map(|(look, _)| others(look)).chain([Vec::new()]).collect();
-        let ego = way(&mut met.iter().map(|(look, _)| look.ego), ego_ends);
-        let other = way(&mut met.iter().map(|(_, place)| *place), ends);
+        let mut ego = way(&mut met.iter().map(|(look, _)| look.ego), ego_ends);
+        let mut other = way(&mut met.iter().map(|(_, place)| *place), ends);
+        ego.intends = ego_intends(world);
+        other.intends = world.npc_facts(contact.obstacle).and_then(|facts| {
+            let at_junction = facts.in_next_junction || facts.junction_ahead_m < BEGINS_M;
+            turn(facts.turn).filter(|_| at_junction)
+        });
+        if world.changes_lanes(contact.obstacle) {
+            other.intends = other.intends.or(Some(Manoeuvre::LaneChange));
+        }
         let ticks: Vec<u64> = met.iter().map(|(look, _)| look.tick).chain([world.ticks()]).collect();
-        let (other_ran_red, other_ran_stop) = ran(world, obstacle, &other, &ticks);
+        let other_ran_red = ran_red(world, obstacle, &other, &ticks);
         let junction = self.junction(world);
         let before = Before {
             body: obstacle.body,
             has_failed: world.ignores(contact.obstacle, TrafficRule::Brakes),
             ran_red: world.red_runs() > first.red_runs || other_ran_red,
-            ran_stop: self.ego_ran_stop(world) || other_ran_stop,
+            ran_stop: world.ego_runs_stop()
+                || world.runs_stop(contact.obstacle) && !world.has_siren(contact.obstacle),
             ego,
             other,
             third,
             in_junction: junction.is_some(),
             is_signalized: junction.is_some_and(|junction| map.junctions[junction].groups > 0),
-            is_lengthwise: !matches!(side(contact.on_ego, &VehicleParameters::MKZ), "left" | "right"),
+            is_lengthwise: is_lengthwise(contact),
             is_wreck: is_wreck && obstacle.body.is_vehicle(),
         };
         (whole, before.kind())
-    }
-
-    /// Whether the ego vehicle passed a stop sign and had not stood before it.
-    fn ego_ran_stop(&self, world: &World) -> bool {
-        let lines = world.scene().route.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
-        let mut lines = lines.map(|line| line.station_m);
-        lines.any(|line_m| {
-            let is_before = |look: &&Look| look.ego_front_m <= line_m;
-            let mut before = self.looks.iter().filter(is_before).peekable();
-            before.peek().is_some()
-                && line_m < front_m(world)
-                && !before.any(|look| look.ego.velocity_mps.norm() < STOOD_MPS)
-        })
     }
 
     /// The junction that the ego vehicle is in, from its front to its rear.
@@ -115,6 +110,44 @@ impl Trails {
         [front_m(world), world.ego_station_m(), rear_m]
             .into_iter()
             .find_map(|station_m| map.lane(route.lane_at(station_m).lane).junction)
+    }
+}
+
+/// A vehicle no farther before a junction begins its turn, m. Ours.
+const BEGINS_M: f64 = 3.0;
+
+/// What the route has for the ego vehicle where it is.
+fn ego_intends(world: &World) -> Option<Manoeuvre> {
+    let station_m = world.ego_station_m();
+    let moment = world.moment_facts();
+    // Counted from the rear axle.
+    let begins_m = VehicleParameters::MKZ.front_m(0.0) + BEGINS_M;
+    let at_junction = moment.ego_road == RoadKind::InJunction || moment.ego_junction_ahead_m < begins_m;
+    let is_changing = || {
+        let mut changes = world.scene().route.changes.iter();
+        changes.any(|change| (change.begin_m..change.latest_m).contains(&station_m))
+            && world.is_between_lanes()
+    };
+    turn(moment.ego_turn).filter(|_| at_junction).or_else(|| is_changing().then_some(Manoeuvre::LaneChange))
+}
+
+fn turn(turn: Turn) -> Option<Manoeuvre> {
+    match turn {
+        Turn::Left => Some(Manoeuvre::LeftTurn),
+        Turn::Right => Some(Manoeuvre::RightTurn),
+        _ => None,
+    }
+}
+
+/// Whether the ends met, and not a flank: at a corner, the motion across it decides.
+fn is_lengthwise(contact: &Contact) -> bool {
+    match side(contact.on_ego, &VehicleParameters::MKZ) {
+        "left" | "right" => false,
+        "front left" | "front right" => {
+            let other = contact.obstacle_velocity_on_ego_mps;
+            (contact.ego_speed_mps - other.x).abs() >= other.y.abs()
+        }
+        _ => true,
     }
 }
 
@@ -136,54 +169,39 @@ fn step(map: &RoadMap, place: Place) -> Step {
     Step { place, off_road_m: map.lane_room_m(position), in_junction, lane_rad }
 }
 
-/// Whether another vehicle passed a red light, and whether it passed a stop sign without having stood before it. One with a siren
-/// may. `ticks`: of its steps.
-fn ran(world: &World, vehicle: &Obstacle, way: &Way, ticks: &[u64]) -> (bool, bool) {
+/// Whether another vehicle passed a red light. One with a siren may. `ticks`: of its steps.
+fn ran_red(world: &World, vehicle: &Obstacle, way: &Way, ticks: &[u64]) -> bool {
     if !BodyClass::Vehicle.holds(vehicle.body) || world.has_siren(vehicle.id) {
-        return (false, false);
+        return false;
     }
-    let stood = |step: usize| way.0[..=step].iter().any(|step| step.place.velocity_mps.norm() < STOOD_MPS);
+    let stood =
+        |step: usize| way.steps[..=step].iter().any(|step| step.place.velocity_mps.norm() < STOOD_MPS);
     // The typology's country lets vehicles turn right at red after a stop.
     let turns_right = way.shape() == Shape::RightTurn;
-    let passed = lines(&world.scene().map, way, vehicle.outline.half_length_m);
-    let mut ran = (false, false);
-    for Passed { step, part, line } in passed {
-        match line {
-            Line::Light(signal) => {
-                let tick = ticks[step] + (part * (ticks[step + 1] - ticks[step]) as f64) as u64;
-                let is_red = world.signal_at(signal, tick) == SignalColour::Red;
-                ran.0 |= is_red && !(turns_right && stood(step));
-            }
-            Line::Stop => ran.1 |= !stood(step),
-        }
-    }
-    ran
+    let passed = lights(&world.scene().map, way, vehicle.outline.half_length_m);
+    passed.iter().any(|&Passed { step, part, signal }| {
+        let tick = ticks[step] + (part * (ticks[step + 1] - ticks[step]) as f64) as u64;
+        let is_red = world.signal_at(signal, tick) == SignalColour::Red;
+        is_red && !(turns_right && stood(step))
+    })
 }
 
-/// A line at which vehicles of a lane stop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Line {
-    /// Of a light: an index in [`RoadMap::signals`].
-    Light(usize),
-    /// Of a stop sign.
-    Stop,
-}
-
-/// A line that the front of a vehicle passed.
+/// The stop line of a light that the front of a vehicle passed.
 #[derive(Debug, Clone, Copy)]
 struct Passed {
     /// The step before, and the part of the way to the next one.
     step: usize,
     part: f64,
-    line: Line,
+    /// Index in [`RoadMap::signals`].
+    signal: usize,
 }
 
-fn lines(map: &RoadMap, way: &Way, half_length_m: f64) -> Vec<Passed> {
+fn lights(map: &RoadMap, way: &Way, half_length_m: f64) -> Vec<Passed> {
     let lane_at = |step: &Step| {
         let Pose { position, heading_rad } = step.place.pose;
         map.nearest(position + step.place.pose.forward() * half_length_m, heading_rad, BESIDE_M)
     };
-    let lanes: Vec<Option<LanePlace>> = way.0.iter().map(lane_at).collect();
+    let lanes: Vec<Option<LanePlace>> = way.steps.iter().map(lane_at).collect();
     let mut passed = Vec::new();
     for (step, pair) in lanes.windows(2).enumerate() {
         let [Some(before), Some(after)] = pair else { continue };
@@ -192,14 +210,11 @@ fn lines(map: &RoadMap, way: &Way, half_length_m: f64) -> Vec<Passed> {
         let mut driven_m = 0.0;
         for (index, stations_m) in stretches {
             let lane = map.lane(index);
-            let lights = lane.stop_lines.iter().map(|line| (line.station_m, Line::Light(line.signal)));
-            let signs = lane.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
-            let signs = signs.map(|line| (line.station_m, Line::Stop));
-            let there = lights.chain(signs).filter(|(station_m, _)| stations_m.contains(station_m));
-            passed.extend(there.map(|(station_m, line)| Passed {
+            let there = lane.stop_lines.iter().filter(|line| stations_m.contains(&line.station_m));
+            passed.extend(there.map(|line| Passed {
                 step,
-                part: (driven_m + station_m - stations_m.start) / whole_m,
-                line,
+                part: (driven_m + line.station_m - stations_m.start) / whole_m,
+                signal: line.signal,
             }));
             driven_m += stations_m.end - stations_m.start;
         }

@@ -3,7 +3,9 @@
 //! The world is taken back to the onset of the hazard (see `hazard`), or to the last moment at which an ego vehicle that
 //! had to give way could still stop, if that is earlier, but no further than 8 s. All other
 //! road users then move as recorded until the recorded contact, and after it as they themselves decide.
-//! The ego vehicle, the same car on the same road, is driven by each reference driver in turn; a driver
+//! The ego vehicle, the same car on the same road, is driven by each reference driver in turn, from the speed that a careful
+//! driver would have had there (`lawful`: an ego vehicle that was faster than the limit or its sight allow is slowed to what they
+//! allow), and no faster than that. A driver
 //! watches for some time before it takes over, and knows from the first which lane changes of the route are begun or over.
 //! If none of the careful drivers avoids the collision,
 //! evasive manoeuvres that begin at the onset without any delay are tried.
@@ -15,8 +17,8 @@
 //!
 //! Where the ego vehicle had to give way, a driver that takes over before the ego vehicle has begun a lane change begins
 //! none without a look aside: the question is whether staying in the lane would have avoided the collision. Where another
-//! vehicle ran into the rear of an ego vehicle that had priority, no driver goes faster than the ego vehicle did: a
-//! vehicle that keeps its lane need not flee from one behind it, which keeps the distance.
+//! vehicle ran into the rear of an ego vehicle that had priority, no driver goes faster than the ego vehicle did, or leaves the
+//! way that it took: a vehicle need not flee from one behind it, which keeps the distance.
 //!
 //! Beside that, each careful driver is asked to the letter of UN R157 (`r157_letter`): from the first conflict of ways
 //! on, the ego vehicle drives along its recorded path at its recorded speed until the model reacts, and then only
@@ -34,7 +36,7 @@ use std::collections::VecDeque;
 use crate::episode;
 use crate::episode::{Choice, EpisodeLog, Moment, Script, Setup};
 use avastra_base::geometry::{OrientedBox, Pose, wrap_angle};
-use avastra_base::kinematics::{CAREFUL_REACTION_S, GRAVITY_MPS2, WALKING_MPS};
+use avastra_base::kinematics::{CAREFUL_BRAKING_MPS2, CAREFUL_REACTION_S, GRAVITY_MPS2, WALKING_MPS};
 use avastra_drivers as ads;
 use avastra_drivers::{Ads, Evasion};
 use avastra_lang::model::vocabulary::Priority;
@@ -43,11 +45,18 @@ use avastra_world::sim::{
     Contact, Control, DT_S, EgoMotion, FRAME_TICKS, VehicleParameters, World, pedals_for,
 };
 
-use super::hazard::{Onset, last_chance, onset};
+use super::hazard::{Onset, last_chance, onset, waiting_line_m};
+use super::lawful::{careful_mps, lawful_mps};
 use crate::episode::{run_into_from_behind, struck};
 
 /// A driver that is held to a speed comes near to it in about this time, s. Ours: longer than the pedal's lag.
 const CATCH_UP_S: f64 = 0.6;
+/// A driver that is too fast slows down by as much, m/s²: a comfortable stop. Ours.
+const SLOWS_MPS2: f64 = 3.0;
+/// A driver that gives way waits this far before the line, m. Ours.
+const WAITS_M: f64 = 1.0;
+/// A vehicle that was run into from behind keeps its way if its middle stays this near to it, m. Ours.
+const KEEPS_M: f64 = 1.0;
 /// The careful drivers: a collision that one of them avoids is avoidable. UN R157's two performance models.
 pub(super) const CAREFUL: [&str; 2] = ["cc", "fsm"];
 /// Other drivers that are tried and reported.
@@ -187,7 +196,9 @@ pub fn judge_one(recording: &[World], contact: &Contact, met: OrientedBox) -> Ju
     let earliest = (last + 1).saturating_sub(ticks(REWIND_S));
     let reacts = shoved(recording, met).map(|shove| (shove + ticks(CAREFUL_REACTION_S)).min(last));
     let earliest = earliest.max(reacts.unwrap_or(0));
-    let from = onset.first.min(last_chance(recording, contact, met).unwrap_or(last)).max(earliest);
+    let line_m = recording.last().and_then(|world| waiting_line_m(world, contact));
+    let chance = last_chance(recording, contact, met, line_m);
+    let from = onset.first.min(chance.unwrap_or(last)).max(earliest);
     let mut case = Case::new(recording, from, contact);
     // The letter keeps the recorded path and speed, whoever had to give way.
     let to_the_letter =
@@ -242,6 +253,11 @@ fn shoved(recording: &[World], met: OrientedBox) -> Option<usize> {
     None
 }
 
+/// The speed from which a comfortable stop takes this way, m/s.
+fn stops_within_mps(room_m: f64) -> f64 {
+    (2.0 * SLOWS_MPS2 * room_m.max(0.0)).sqrt()
+}
+
 fn names<'a>(drivers: impl Iterator<Item = &'a str>) -> Vec<String> {
     drivers.map(str::to_owned).collect()
 }
@@ -263,16 +279,32 @@ struct Case<'a> {
     looks_anew: bool,
     /// No reference driver goes faster, m/s; infinite unless the ego vehicle was run into from behind.
     speed_mps_max: f64,
+    /// The station of the line before which a careful driver waits, because it has to give way, m.
+    waits_at_m: Option<f64>,
+    /// Whether the drivers keep to the way that the ego vehicle took: it was run into from behind.
+    keeps_way: bool,
 }
 
 impl<'a> Case<'a> {
     fn new(recording: &'a [World], from: usize, contact: &Contact) -> Case<'a> {
-        let speed_mps_max = match run_into_from_behind(contact, &VehicleParameters::MKZ) {
+        let keeps_way = run_into_from_behind(contact, &VehicleParameters::MKZ);
+        let speed_mps_max = match keeps_way {
             true => recording[from..].iter().map(|world| world.ego().speed_mps).fold(0.0, f64::max),
             false => f64::INFINITY,
         };
-        let looks_anew = contact.priority == Priority::Other;
-        Case { recording, from, obstacle: contact.obstacle, looks_anew, speed_mps_max }
+        let looks_anew = contact.ruling.priority == Priority::Other;
+        let is_before =
+            |line_m: &f64| VehicleParameters::MKZ.front_m(recording[from].ego_station_m()) < *line_m;
+        let line_m = recording.last().and_then(|world| waiting_line_m(world, contact));
+        Case {
+            recording,
+            from,
+            obstacle: contact.obstacle,
+            looks_anew,
+            speed_mps_max,
+            waits_at_m: line_m.filter(is_before),
+            keeps_way,
+        }
     }
 
     /// Those of the reference drivers that avoid the collision.
@@ -284,7 +316,20 @@ impl<'a> Case<'a> {
     /// Whether a driver that watches first avoids the collision.
     fn avoids(&self, driver: &mut dyn Ads) -> bool {
         self.show(driver);
-        self.drive(driver, &mut |_| true)
+        self.drive(driver, &mut |world| self.is_on_way(world))
+    }
+
+    /// Whether the ego vehicle is where it may be: anywhere, unless it has to keep to its way.
+    fn is_on_way(&self, world: &World) -> bool {
+        if !self.keeps_way {
+            return true;
+        }
+        let here = world.ego_outline().pose.position;
+        // Beyond the last place of the recording it goes on as it looks there.
+        let [.., last] = self.recording else { return true };
+        let ahead = last.ego_outline().pose.to_local(here);
+        let is_near = |world: &World| (world.ego_outline().pose.position - here).norm() < KEEPS_M;
+        (ahead.x > 0.0 && ahead.y.abs() < KEEPS_M) || self.recording[self.from..].iter().any(is_near)
     }
 
     /// The drives of all reference drivers.
@@ -338,7 +383,7 @@ impl<'a> Case<'a> {
         let start = &self.recording[self.from];
         let mut manoeuvres = Evasion::all(start.scene());
         let starts_on_road = is_on_road(start);
-        let free = Case { speed_mps_max: f64::INFINITY, ..*self };
+        let free = Case { speed_mps_max: f64::INFINITY, keeps_way: false, ..*self };
         let found = manoeuvres.find(|manoeuvre| {
             let mut driver = manoeuvre.clone();
             free.drive(&mut driver, &mut |world| !starts_on_road || is_on_road(world))
@@ -348,7 +393,8 @@ impl<'a> Case<'a> {
 
     /// Drives from the onset on; `false` if there is a collision, or a world is not `allowed`.
     fn drive(&self, driver: &mut dyn Ads, allowed: &mut dyn FnMut(&World) -> bool) -> bool {
-        let mut world = self.recording[self.from].clone();
+        let start = &self.recording[self.from];
+        let mut world = start.with_ego_at_most(lawful_mps(start));
         let mut sensed = world.sensed();
         if self.looks_anew {
             driver.take_over(&sensed);
@@ -381,12 +427,20 @@ impl<'a> Case<'a> {
         true
     }
 
-    /// A command with no more throttle than the highest speed allows.
+    /// A command with which the ego vehicle goes no faster than a careful driver does here.
     fn held(&self, control: Control, world: &World) -> Control {
-        if self.speed_mps_max.is_infinite() {
-            return control;
+        let front_m = VehicleParameters::MKZ.front_m(world.ego_station_m());
+        let waits = self.waits_at_m.filter(|line_m| *line_m > front_m);
+        let waits_mps = waits.map_or(f64::INFINITY, |line_m| stops_within_mps(line_m - front_m - WAITS_M));
+        let most_mps = self.speed_mps_max.min(careful_mps(world)).min(waits_mps);
+        // Harder than comfortably, where the line comes up too soon for that.
+        let slows_mps2 = if waits_mps <= most_mps { CAREFUL_BRAKING_MPS2 } else { SLOWS_MPS2 };
+        let wanted_mps2 = (most_mps - world.ego().speed_mps) / CATCH_UP_S;
+        if wanted_mps2 < -SLOWS_MPS2 / 2.0 {
+            let (_, brake_pct) = pedals_for(wanted_mps2.max(-slows_mps2));
+            return Control { throttle_pct: 0.0, brake_pct: control.brake_pct.max(brake_pct), ..control };
         }
-        let (throttle_pct, _) = pedals_for((self.speed_mps_max - world.ego().speed_mps) / CATCH_UP_S);
+        let (throttle_pct, _) = pedals_for(wanted_mps2);
         Control { throttle_pct: control.throttle_pct.min(throttle_pct), ..control }
     }
 

@@ -1,8 +1,9 @@
 //! The onset of a hazard: when a collision began to take shape.
 //! A moment belongs to the hazard if the obstacle was on the ego vehicle's way or heading for it, or if one of the two
 //! visibly did something that the other need not expect: it was beyond the middle of the road or beside its lane, came
-//! out of its lane sideways, was in a junction that it had entered at a red light, or was on foot on the carriageway.
-//! Take the last uninterrupted series of such moments before the contact: the onset is its first moment at which the
+//! out of its lane sideways, was in a junction that it was not allowed to enter (a red light, late yellow, a stop sign that it
+//! passed without standing), was on foot on the carriageway or waited at a crosswalk, or stood in the ego vehicle's way. A thing
+//! that stands beside the way is no hazard. Take the last uninterrupted series of such moments before the contact: the onset is its first moment at which the
 //! obstacle could be seen. So the judgement begins with the first violation or visible intention of either.
 //!
 //! The way is the one that the ego vehicle took, as wide as the vehicle and the 0.375 m by which careful drivers
@@ -11,13 +12,21 @@
 //! clear which vehicle will be there first.
 
 use avastra_base::geometry::{OrientedBox, Pose, distance_m};
-use avastra_base::kinematics::{CAREFUL_BRAKING_MPS2, CAREFUL_DELAY_S, GRAVITY_MPS2, WANDER_M, stopping_m};
+use avastra_base::kinematics::{
+    CAREFUL_BRAKING_MPS2, CAREFUL_DELAY_S, GRAVITY_MPS2, STANDING_MPS, WALKING_MPS, WANDER_M, stopping_m,
+};
 use avastra_drivers::in_sight;
-use avastra_lang::model::vocabulary::Priority;
-use avastra_world::sim::{Contact, DT_S, FRAME_TICKS, Obstacle, World};
+use avastra_lang::model::vocabulary::{Body, Priority};
+use avastra_road::RouteLane;
+use avastra_world::sim::{Contact, DT_S, FRAME_TICKS, Obstacle, Rule, VehicleParameters, World};
+
+use super::lawful::waits_at_crosswalk;
 
 /// Places of a prediction and of the ego vehicle's way are compared at this many ticks, 0.2 s.
 const STRIDE: usize = 2 * FRAME_TICKS as usize;
+
+/// A line at which a vehicle waits is at most so far before its junction, m.
+const APPROACH_M: f64 = 40.0;
 
 /// Two beginnings of a hazard, as indices in a recording of the worlds up to the contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,11 +58,13 @@ pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<Ons
             continue;
         }
         let Some(other) = world.obstacle(obstacle) else { break };
+        let stands = other.velocity_mps.norm() < STANDING_MPS && other.body != Body::Pedestrian;
         let conflicts = !conflict_over
             && (0..=left.div_ceil(STRIDE)).any(|step| {
                 let mut then = other.outline;
                 then.pose.position += other.velocity_mps * (step * STRIDE) as f64 * DT_S;
-                way.iter().any(|ego| near(ego, &then))
+                // What stands beside the way wanders no more.
+                way.iter().any(|ego| near(ego, &then, if stands { 0.0 } else { WANDER_M }))
             });
         if !conflicts && !is_out_of_order(world, other) {
             if began {
@@ -76,15 +87,54 @@ pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<Ons
     Some(Onset { first, conflict: conflict.unwrap_or(recording.len() - 1) })
 }
 
+/// Where the ego vehicle had to give way at a junction that it is in at the contact: the station of the line before which it
+/// had to wait (of a light, a sign, or the edge of the junction), m.
+pub fn waiting_line_m(world: &World, contact: &Contact) -> Option<f64> {
+    let at_junction = match contact.ruling.rule {
+        Rule::Siren
+        | Rule::Light
+        | Rule::BothLights
+        | Rule::StopSign
+        | Rule::FirstToStop
+        | Rule::Sign
+        | Rule::Turning
+        | Rule::FromTheRight
+        | Rule::SameSide => true,
+        _ => false,
+    };
+    let (route, map) = (&world.scene().route, &world.scene().map);
+    let front_m = VehicleParameters::MKZ.front_m(world.ego_station_m());
+    let is_inside = |part: &&RouteLane| map.lane(part.lane).junction.is_some();
+    let mut before = route.lanes.iter().rev().skip_while(|part| part.from_m > front_m).peekable();
+    // The bumper may already look out of the junction.
+    while before.next_if(|part| !is_inside(part)).is_some() {}
+    let entry = before.take_while(is_inside).last()?;
+    let lights = route.stop_lines.iter().map(|line| line.station_m);
+    let signs = route.sign_lines.iter().map(|line| line.station_m);
+    let near = |line_m: &f64| (entry.from_m - APPROACH_M..=entry.from_m + 1.0).contains(line_m);
+    let line_m = lights.chain(signs).filter(near).fold(f64::NEG_INFINITY, f64::max);
+    let line_m = if line_m.is_finite() { line_m } else { entry.from_m };
+    (contact.ruling.priority != Priority::Ego && at_junction && line_m < front_m).then_some(line_m)
+}
+
 /// Index of the last moment at which a careful driver could still stop before the place of a collision in which the ego
-/// vehicle had to give way; if the obstacle came into sight later, index of that moment. The ego vehicle's violation begins
+/// vehicle had to give way (`line_m`: or before the line at which it had to wait); if the obstacle came into sight later, index of that moment. The ego vehicle's violation begins
 /// there, though it may not be in the junction yet. `None` if it did not have to give way, or the obstacle was not in sight.
-pub fn last_chance(recording: &[World], contact: &Contact, met: OrientedBox) -> Option<usize> {
-    if contact.priority != Priority::Other {
+pub fn last_chance(
+    recording: &[World],
+    contact: &Contact,
+    met: OrientedBox,
+    line_m: Option<f64>,
+) -> Option<usize> {
+    if contact.ruling.priority != Priority::Other && line_m.is_none() {
         return None;
     }
-    let mut sensed = recording.last()?.sensed();
-    let (mut way_m, mut next) = (0.0, met.pose.position);
+    let last = recording.last()?;
+    let mut sensed = last.sensed();
+    // To the line it is as much less as the front is beyond it at the contact.
+    let front_m = VehicleParameters::MKZ.front_m(last.ego_station_m());
+    let beyond_m = line_m.map_or(0.0, |line_m| front_m - line_m);
+    let (mut way_m, mut next) = (-beyond_m, met.pose.position);
     let mut found = None;
     for (index, world) in recording.iter().enumerate().rev() {
         let here = world.ego_outline().pose.position;
@@ -110,20 +160,31 @@ pub fn last_chance(recording: &[World], contact: &Contact, met: OrientedBox) -> 
 /// Whether the ego vehicle or the obstacle visibly does something that the other need not expect.
 fn is_out_of_order(world: &World, obstacle: &Obstacle) -> bool {
     let map = &world.scene().map;
-    if world.is_astray() || world.ego_runs_red() || map.is_beyond_middle(&world.ego_outline()) {
+    if world.is_astray() || world.ego_runs() || map.is_beyond_middle(&world.ego_outline()) {
         return true;
     }
-    let (outline, Pose { position, heading_rad }) = (&obstacle.outline, obstacle.outline.pose);
+    let outline = &obstacle.outline;
+    let speed_mps = obstacle.velocity_mps.norm();
+    let stands = speed_mps < STANDING_MPS;
+    if speed_mps < WALKING_MPS && world.is_in_the_way(obstacle) {
+        return true;
+    }
     if obstacle.body.is_vehicle() {
-        obstacle.moves_aside() || world.runs_red(obstacle.id) || map.is_beyond_middle(outline)
-    } else {
-        map.nearest(position, heading_rad, 0.0).is_some()
+        return obstacle.moves_aside()
+            || world.runs(obstacle.id)
+            || world.intrudes(obstacle.id)
+            || map.is_beyond_middle(outline);
+    }
+    let Pose { position, heading_rad } = outline.pose;
+    match obstacle.body == Body::Object && stands {
+        true => false,
+        false => map.nearest(position, heading_rad, 0.0).is_some() || waits_at_crosswalk(world, obstacle),
     }
 }
 
-/// Whether two outlines are no farther apart than drivers wander.
-fn near(ego: &OrientedBox, other: &OrientedBox) -> bool {
-    let reach_m = ego.radius_m() + other.radius_m() + WANDER_M;
+/// Whether two outlines are no farther apart than so.
+fn near(ego: &OrientedBox, other: &OrientedBox, apart_m: f64) -> bool {
+    let reach_m = ego.radius_m() + other.radius_m() + apart_m;
     let apart = ego.pose.position - other.pose.position;
-    apart.norm_squared() <= reach_m * reach_m && distance_m(ego, other) <= WANDER_M
+    apart.norm_squared() <= reach_m * reach_m && distance_m(ego, other) <= apart_m
 }

@@ -8,6 +8,7 @@ mod evidence;
 mod counted;
 mod hazard;
 mod kept;
+mod lawful;
 mod measured;
 mod mechanisms;
 mod recurrence;

@@ -118,7 +118,13 @@ pub fn severity(collision: &Collision) -> Severity {
     severity.harm_share = speed_mps / serious_mps;
     severity.harm = match () {
         () if severity.harm_share >= 1.0 => Harm::Serious,
-        () if speed_mps < WALKING_MPS && body.is_vehicle() && !body.has_two_wheels() => Harm::Minor,
+        // A touch stays one, however heavy the other is.
+        () if speed_mps.min(severity.closing_speed_mps) < WALKING_MPS
+            && body.is_vehicle()
+            && !body.has_two_wheels() =>
+        {
+            Harm::Minor
+        }
         () => Harm::Moderate,
     };
     severity
@@ -141,8 +147,8 @@ mod tests {
     use crate::episode::{PreCrash, Shape};
     use avastra_lang::model::BodyWord;
     use avastra_lang::model::body::parameters;
-    use avastra_lang::model::vocabulary::{Body, Priority, Verb};
-    use avastra_world::sim::Contact;
+    use avastra_lang::model::vocabulary::{Body, Verb};
+    use avastra_world::sim::{Contact, Ruling};
 
     #[test]
     fn momentum_is_kept() {
@@ -155,7 +161,7 @@ mod tests {
             obstacle_velocity_mps: Vec2::zeros(),
             obstacle_velocity_on_ego_mps: Vec2::new(4.0, 3.0),
             closing_speed_mps: 4.0,
-            priority: Priority::None,
+            ruling: Ruling::default(),
         };
         for body in [Body::SchoolBus, Body::Hatchback, Body::Pedestrian] {
             let mass_t = parameters(body).mass_t;

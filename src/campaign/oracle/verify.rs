@@ -131,7 +131,7 @@ impl Played<'_> {
                 judged(claim, self.collision(*obstacle).and_then(judge))
             }
             Claim::Priority { priority, obstacle } => {
-                let judge = |index: usize| match log.collisions[index].contact.priority {
+                let judge = |index: usize| match log.collisions[index].contact.ruling.priority {
                     found if found == *priority => Ok(()),
                     found => Err(format!("priority {}", found.name())),
                 };

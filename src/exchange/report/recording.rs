@@ -287,7 +287,7 @@ fn collision(
         "precrash_number": found.kind.number(), "verb": found.verb.name(),
         "x_m": contact.point.x, "y_m": contact.point.y, "counted": counted, "class": judgement.class.name(),
         "onset_s": judgement.onset_s, "avoided_by": judgement.avoided_by, "letter": judgement.r157_letter,
-        "evasion": judgement.evasion, "priority": contact.priority.name(), "side": severity.side, "approach": severity.approach,
+        "evasion": judgement.evasion, "priority": contact.ruling.priority.name(), "ruling": contact.ruling.describe(), "side": severity.side, "approach": severity.approach,
         "ego_mps": contact.ego_speed_mps, "closing_mps": severity.closing_speed_mps, "delta_v_mps": severity.delta_v_mps,
         "other_delta_v_mps": severity.obstacle_delta_v_mps, "harm": severity.harm.name(), "harm_share": rounded(severity.harm_share),
         "recurrence": recurrence, "sudden": facts.sudden, "struck": facts.struck, "cause": cause,

@@ -94,6 +94,8 @@ pub struct TickFacts {
     pub lane_offset_m: f64,
     pub over_oncoming_m: f64,
     pub over_lane_m: f64,
+    /// How far its middle is beside all lanes, m.
+    pub off_road_m: f64,
     pub visibility_m: f64,
     pub jerk_mps3: f64,
     pub lateral_mps2: f64,

@@ -275,7 +275,7 @@ facts! {
     EgoLeadSince "ego.lead_since" DURATION, Tick, tick.lead_since_s =
         "A `Duration`: since when it has been that one; 0 if there is none.", FROM_0;
     EgoOverRed "ego.over_red" LENGTH, Tick, tick.over_red_m =
-        "A `Length`: how far its front is beyond the stop line of a light that was red as it passed, until its rear has passed, too; else minus the way to a red light; at least -100 m.";
+        "A `Length`: how far its front is beyond the stop line of a light that was red as it passed, up to 30 m and while the light is red; else minus the way to a red light; at least -100 m.";
     EgoOverStop "ego.over_stop" LENGTH, Tick, tick.over_stop_m =
         "A `Length`: how far its front is beyond the line of a stop sign, until its rear has passed, too; else minus the way to the next one; at least -100 m.";
     EgoOverLine "ego.over_line" LENGTH, Tick, tick.over_line_m =
@@ -288,6 +288,8 @@ facts! {
         "A `Length`: how far its outline reaches into a lane of the other direction; below 0 the room that is left; -100 m in junctions and where there is no such lane.";
     EgoOverLane "ego.over_lane" LENGTH, Tick, tick.over_lane_m =
         "A `Length`: how far its outline reaches beyond the lines of its route's lane (of both lanes where the route may change lanes); below 0 the room that is left; -100 m in junctions.";
+    EgoOffRoad "ego.off_road" LENGTH, Tick, tick.off_road_m =
+        "A `Length`: from its middle to the nearest driving lane, at most 3 m; below 0 on one.";
     EgoVisibility "ego.visibility" LENGTH, Tick, tick.visibility_m =
         "A `Length`: how far the fog lets one see; 10 km in clear air.";
     EgoJerk "ego.jerk" JERK, Tick, tick.jerk_mps3 =

@@ -8,12 +8,13 @@ use super::body::BodyParameters;
 use super::environment::Grip;
 use super::npc::Driver;
 use super::pedestrian::Walker;
-use super::right_of_way::PassedLight;
+use super::right_of_way::Passed;
 use super::road_user::{Motion, Obstacle, RoadUser};
 use super::scene::Scene;
 use super::sense::EgoMotion;
 use super::signals::SignalClock;
 use super::traffic::TrafficProfile;
+use super::world::DT_S;
 
 /// A way within this distance of the route meets it or passes over it, m: three lanes, so that what drives beside
 /// the ego vehicle is on its level even if it passes over the route later.
@@ -43,8 +44,8 @@ pub(super) struct Around<'a> {
     pub ego_elevation_m: f64,
     pub ego_station_m: f64,
     pub ego_offset_m: f64,
-    /// The light that the ego vehicle passed last.
-    pub ego_passed: Option<PassedLight>,
+    /// The lines that the ego vehicle passed last.
+    pub ego_passed: Passed,
     /// All other road users: those before it in the world's order, and those after it.
     pub users: [&'a [RoadUser]; 2],
     pub signals: &'a SignalClock,
@@ -79,6 +80,11 @@ impl<'a> From<&'a Obstacle> for Other<'a> {
 }
 
 impl Around<'_> {
+    /// Since the episode began, s.
+    pub fn time_s(&self) -> f64 {
+        self.tick as f64 * DT_S
+    }
+
     /// Whether a road user does in this tick what it does every so many ticks.
     pub fn is_due(&self, id: u32, every_ticks: u64) -> bool {
         let own = match self.reactions {
@@ -133,7 +139,7 @@ impl Around<'_> {
 
     /// Whether the ego vehicle is in a junction that it entered at red.
     pub fn ego_runs_red(&self) -> bool {
-        self.ego_passed.is_some_and(|passed| passed.is_being_run(&self.scene.map, self.ego_outline))
+        self.ego_passed.is_running_red(&self.scene.map, self.ego_outline)
     }
 
     /// The ego vehicle and every obstacle.

@@ -5,8 +5,8 @@
 //! as far as a car can: no body is pushed backwards or sideways or turned, and a person that was hit stays in place.
 
 use avastra_base::geometry::{Sweep, Vec2, first_contact};
-use avastra_lang::model::vocabulary::Priority;
 
+use super::right_of_way::Ruling;
 use super::world::DT_S;
 
 /// The ego vehicle touched an obstacle that it did not touch in the tick before.
@@ -28,8 +28,8 @@ pub struct Contact {
     pub obstacle_velocity_on_ego_mps: Vec2,
     /// Speed at which the gap between the outlines closed where they met, m/s, not negative.
     pub closing_speed_mps: f64,
-    /// Which of the two had priority, as of the moment when the first of them came into the other's way.
-    pub priority: Priority,
+    /// Which of the two had priority, as of the moment when the first of them came into the other's way, and why.
+    pub ruling: Ruling,
 }
 
 /// One party of a possible contact during one tick.
@@ -65,7 +65,7 @@ pub(super) fn meet(
             ego_pose.left().dot(&obstacle.velocity_mps),
         ),
         closing_speed_mps: closing_mps.max(0.0),
-        priority: Priority::None,
+        ruling: Ruling::default(),
     };
     Some((contact, first.normal))
 }

@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use avastra_base::geometry::{Pose, smooth_step, unit_vector, wrap_angle};
+use avastra_base::geometry::{Path, Pose, smooth_step, unit_vector, wrap_angle};
 use avastra_lang::model::Trajectory;
 use avastra_lang::model::command::{AsideBy, Command};
 
@@ -204,6 +204,11 @@ impl Guided {
     /// Height of the road where it is, m.
     pub fn height_m(&self) -> f64 {
         self.way.height_at(self.station_m)
+    }
+
+    /// The path that it follows, and the station of its middle on it, m.
+    pub fn way(&self) -> (&Path, f64) {
+        (&self.way.path, self.station_m + self.to_middle_m)
     }
 
     pub fn station_m(&self) -> f64 {

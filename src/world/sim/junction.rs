@@ -109,17 +109,31 @@ fn stretch_near(lane: &Lane, other: &Lane) -> Option<(f64, f64)> {
     stretch
 }
 
-/// Whether `a` goes before `b`.
+/// Whether `a` goes before `b`; see [`order`].
+pub(super) fn goes_first(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> bool {
+    order(map, a, b).0
+}
+
+/// What decides which of two lanes goes first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Order {
+    Signs,
+    Turning,
+    FromTheRight,
+    SameSide,
+}
+
+/// Whether `a` goes before `b`, and what decides it.
 ///
 /// Signs decide first: a priority road before a lane without signs, and that before a stop or yield sign.
 /// Where they say the same, a vehicle that turns left (right, where traffic keeps left) or round yields to oncoming
 /// traffic; otherwise the vehicle from the right
 /// goes first (Vienna Convention, article 18; so in Estonia and California). Of two from the same side,
 /// the one that turns less goes first; if they turn alike, the lane that the file names first.
-pub(super) fn goes_first(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> bool {
+pub(super) fn order(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> (bool, Order) {
     let (signs_a, signs_b) = (map.lane(a).precedence, map.lane(b).precedence);
     if signs_a != signs_b {
-        return signs_a < signs_b;
+        return (signs_a < signs_b, Order::Signs);
     }
     let approach_rad = |lane: LaneIndex| map.lane(lane).centre.points()[0].heading_rad;
     let angle_rad = wrap_angle(approach_rad(b) - approach_rad(a));
@@ -133,11 +147,15 @@ pub(super) fn goes_first(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> bool {
             Turn::UTurn => 3,
         }
     };
-    if angle_rad.abs() > OPPOSING_RAD_MIN || angle_rad.abs() < ALONGSIDE_RAD_MAX {
-        return (rank(a), a) < (rank(b), b);
+    let goes_before = (rank(a), a) < (rank(b), b);
+    if angle_rad.abs() > OPPOSING_RAD_MIN {
+        return (goes_before, Order::Turning);
+    }
+    if angle_rad.abs() < ALONGSIDE_RAD_MAX {
+        return (goes_before, Order::SameSide);
     }
     // A heading turned to the left of the own one comes from the right.
-    angle_rad < 0.0
+    (angle_rad < 0.0, Order::FromTheRight)
 }
 
 #[cfg(test)]

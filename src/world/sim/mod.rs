@@ -63,7 +63,7 @@ pub use environment::friction_scale;
 pub use guided::ASIDE_MPS;
 pub use incident::Incident;
 pub use moment::MomentParts;
-pub use right_of_way::right_of_way;
+pub use right_of_way::{Mover, Rule, Ruling, right_of_way};
 pub use road_user::{Obstacle, PhaseCount};
 pub use scene::{RANGE_M, Scene};
 pub use sense::{Conditions, EgoMotion, FRAME_S, FRAME_TICKS, Sensed, SensedObject, SignalColour};

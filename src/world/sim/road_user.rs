@@ -574,6 +574,11 @@ impl Mover {
         matches!(&self.motion, Motion::Drive(driver) if driver.has_siren)
     }
 
+    /// Whether it drives a lane change.
+    pub fn is_changing_lanes(&self) -> bool {
+        matches!(&self.motion, Motion::Drive(driver) if driver.is_changing_lanes())
+    }
+
     /// Whether it drives, and ignores a rule of the road.
     pub fn ignores(&self, rule: TrafficRule) -> bool {
         matches!(&self.motion, Motion::Drive(driver) if driver.ignores.contains(rule))
@@ -618,7 +623,11 @@ impl Mover {
                 let moved = driver.step(&View { this, size: &self.size, around }, self.touched, in_sight);
                 if way == Arc::as_ptr(&driver.way) {
                     let front_m = this.outline.half_length_m;
-                    self.rights.pass(&driver.way, before_m + front_m, driver.station_m + front_m, around);
+                    let (from_m, to_m) = (before_m + front_m, driver.station_m + front_m);
+                    let stops = driver.way.stop_signs_m.iter();
+                    let stops = stops.map(|at_m| (*at_m, driver.way.lane_at(*at_m).0));
+                    let lights = &driver.way.stop_lines;
+                    self.rights.passed.pass(lights, stops, (from_m, to_m), driver.speed_mps, around);
                 }
                 moved
             }
@@ -626,7 +635,11 @@ impl Mover {
             // Who has still something to do does not leave.
             Motion::Walk(walker) => walker.step(this, in_sight || self.course.is_some(), around),
             Motion::Stroll(stroller) => stroller.step(this, in_sight || self.course.is_some(), around),
-            Motion::Guide(guided) => Some(guided.step(this, self.touched, around)),
+            Motion::Guide(guided) => {
+                let moved = guided.step(this, self.touched, around);
+                self.rights.passed.pass_freely(this, &moved, around);
+                Some(moved)
+            }
             Motion::Stand => Some(rest),
         }
     }

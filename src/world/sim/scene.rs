@@ -217,7 +217,7 @@ impl Scene {
     }
 
     /// Distance from a point to the nearest crosswalk, m: 0 on one, at most [`CROSSWALK_GAP_M_MAX`].
-    pub(super) fn crosswalk_gap_m(&self, point: Vec2) -> f64 {
+    pub fn crosswalk_gap_m(&self, point: Vec2) -> f64 {
         self.crosswalk_circles.iter().enumerate().fold(CROSSWALK_GAP_M_MAX, |least_m, (crosswalk, circle)| {
             let (middle, radius_m) = circle;
             match (point - middle).norm() - radius_m < least_m {

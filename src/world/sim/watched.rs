@@ -21,6 +21,8 @@ use super::world::{DT_S, World};
 const WAY_ASIDE_M: f64 = 9.0;
 /// Ticks of a second.
 const TICKS_PER_S: usize = (1.0 / DT_S) as usize;
+/// A vehicle that is farther beyond a line has run its light, m: most junctions are no wider.
+const OVER_RED_M_MAX: f64 = 30.0;
 /// Stands for no red light and for no oncoming lane near, m.
 const FAR_M: f64 = -100.0;
 
@@ -31,8 +33,8 @@ pub struct Watched {
     lead: Option<(u32, u64, f64)>,
     red_runs: u32,
     crosses: Crossing,
-    /// The stop line that its front passed at red, until its rear has passed it.
-    red_line_m: Option<f64>,
+    /// The stop line that its front passed at red and its light, while that is red.
+    red_line_m: Option<(f64, usize)>,
     /// The accelerations of the last second, the latest last, m/s².
     accelerations: VecDeque<f64>,
 }
@@ -52,6 +54,7 @@ pub struct WatchedParts {
     /// Of road users near.
     pub lanes_left: bool,
     pub off_road: bool,
+    pub ego_off_road: bool,
 }
 
 impl WatchedParts {
@@ -70,6 +73,7 @@ impl WatchedParts {
                 Fact::EgoOverCrosswalk => parts.crosswalk = true,
                 Fact::NpcLanesLeft => parts.lanes_left = true,
                 Fact::NpcOffRoad => parts.off_road = true,
+                Fact::EgoOffRoad => parts.ego_off_road = true,
                 Fact::EgoOverRed => parts.red = true,
                 Fact::EgoOverStop => parts.stop = true,
                 Fact::EgoOverOncoming => parts.oncoming = true,
@@ -101,6 +105,10 @@ impl Watched {
             over_stop_m: if parts.stop { over_stop_m(&around) } else { f64::NAN },
             over_oncoming_m: if parts.oncoming { over_oncoming_m(&around) } else { f64::NAN },
             over_lane_m: if parts.lane { over_lane_m(&around) } else { f64::NAN },
+            off_road_m: match parts.ego_off_road {
+                true => around.scene.map.lane_room_m(around.ego_outline.pose.position),
+                false => f64::NAN,
+            },
             visibility_m: around.visibility_m,
             jerk_mps3: if parts.jerk { self.jerk_mps3(around.ego.acceleration_mps2) } else { f64::NAN },
             lateral_mps2: around.ego.speed_mps * around.ego.yaw_rate_radps,
@@ -184,22 +192,25 @@ impl Watched {
 
     fn over_red_m(&mut self, world: &World, around: &Around) -> f64 {
         let ego = VehicleParameters::MKZ;
-        let (front_m, rear_m) = (ego.front_m(around.ego_station_m), ego.rear_m(around.ego_station_m));
+        let front_m = ego.front_m(around.ego_station_m);
         let lines = &around.scene.route.stop_lines;
         if world.red_runs() > self.red_runs {
             self.red_runs = world.red_runs();
             let passed = lines.iter().rfind(|line| line.station_m <= front_m);
-            self.red_line_m = passed.map(|line| line.station_m);
+            self.red_line_m = passed.map(|line| (line.station_m, line.signal));
         }
-        self.red_line_m = self.red_line_m.filter(|line_m| rear_m < *line_m);
-        if let Some(line_m) = self.red_line_m {
+        let is_red = |signal: usize| {
+            around.signals.colour(&around.scene.map, signal, around.tick) == SignalColour::Red
+        };
+        // It grows with every metre at red: one that stops behind the line has gone less far wrong than one that drives through.
+        self.red_line_m =
+            self.red_line_m.filter(|(line_m, signal)| front_m - line_m < OVER_RED_M_MAX && is_red(*signal));
+        if let Some((line_m, _)) = self.red_line_m {
             return front_m - line_m;
         }
         let reach = front_m..=front_m + LIGHT_AHEAD_M;
         let next = lines.iter().find(|line| reach.contains(&line.station_m));
-        let red = next.filter(|line| {
-            around.signals.colour(&around.scene.map, line.signal, around.tick) == SignalColour::Red
-        });
+        let red = next.filter(|line| is_red(line.signal));
         red.map_or(FAR_M, |line| front_m - line.station_m)
     }
 }
@@ -383,6 +394,7 @@ mod tests {
         crosses: true,
         lanes_left: true,
         off_road: true,
+        ego_off_road: true,
     };
 
     #[test]

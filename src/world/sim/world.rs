@@ -18,7 +18,7 @@ use avastra_lang::model::body::BodyParameters;
 use avastra_lang::model::command::Command;
 use avastra_lang::model::vocabulary::{Body, Level, LightColour, TimeOfDay, TrafficRule};
 use avastra_lang::model::{COMMANDED_MAX, Memory, NpcFacts, Road, Space, TICK_MS};
-use avastra_road::{RouteLaneChange, is_apart};
+use avastra_road::{RouteLaneChange, SignKind, is_apart};
 
 use super::ambient::{Ambient, RENEWAL_TICKS, is_gone};
 use super::around::Around;
@@ -27,7 +27,7 @@ use super::ego::{Control, Ego, VehicleParameters};
 use super::environment::Environment;
 use super::incident::{Bump, Incident, bump, exchange, impact};
 use super::moment::npc_facts;
-use super::right_of_way::PassedLight;
+use super::right_of_way::{Passed, light_before, room_before_m};
 use super::road_user::{Moved, Obstacle, PhaseCount, RoadUser};
 use super::scene::Scene;
 use super::sense::{
@@ -119,6 +119,9 @@ struct Switch {
     at_m: f64,
 }
 
+/// A vehicle that was hit from behind is pushed for so long, ticks: 2 s. Ours: with brakes it stands within it.
+const PUSHED_TICKS: u64 = ticks(2.0);
+
 /// The whole state of an episode: `Clone` is a snapshot.
 #[derive(Debug, Clone)]
 pub struct World {
@@ -132,7 +135,9 @@ pub struct World {
     /// Height of the road under it, m. It follows from the station.
     ego_elevation_m: f64,
     red_runs: u32,
-    ego_passed: Option<PassedLight>,
+    ego_passed: Passed,
+    /// Until this tick another vehicle pushes the ego vehicle.
+    pushed_until: u64,
     environment: Environment,
     conditions: Conditions,
     signals: SignalClock,
@@ -181,7 +186,8 @@ impl World {
             ego_offset_m: 0.0,
             ego_elevation_m: scene.route.height_at(&scene.map, station_m),
             red_runs: 0,
-            ego_passed: None,
+            ego_passed: Passed::default(),
+            pushed_until: 0,
             conditions: environment.conditions(speed_mps),
             environment,
             signals: SignalClock::new(start.signal_phase_s, scene.signal_program),
@@ -468,6 +474,8 @@ impl World {
             traffic: _,
             // It follows from the station.
             ego_elevation_m: _,
+            // It follows from the contacts, and they from what is traced.
+            pushed_until: _,
             // No tick reads these.
             contacts: _,
             incidents: _,
@@ -477,7 +485,7 @@ impl World {
         ego.trace(trace);
         trace.numbers([*ego_station_m, *ego_offset_m]);
         trace.word(u64::from(*red_runs));
-        PassedLight::trace(ego_passed.as_ref(), trace);
+        ego_passed.trace(trace);
         environment.trace(trace);
         // All but the friction follows from the environment.
         trace.number(conditions.friction);
@@ -520,14 +528,70 @@ impl World {
 
     /// Whether the ego vehicle is in a junction that it entered at a red light.
     pub fn ego_runs_red(&self) -> bool {
-        self.ego_passed.is_some_and(|passed| passed.is_being_run(&self.scene.map, &self.ego.outline))
+        self.ego_passed.is_running_red(&self.scene.map, &self.ego.outline)
     }
 
-    /// Whether the road user with an id is in a junction that it entered at a red light.
-    pub fn runs_red(&self, id: u32) -> bool {
+    /// Whether the ego vehicle is in a junction that it was not allowed to enter: at red, late at yellow, or past a stop sign
+    /// without having stood.
+    pub fn ego_runs(&self) -> bool {
+        self.ego_passed.is_running(&self.scene.map, &self.ego.outline)
+    }
+
+    /// This world with an ego vehicle that drives no faster than so.
+    pub fn with_ego_at_most(&self, speed_mps: f64) -> World {
+        let mut world = self.clone();
+        world.ego.motion.speed_mps = world.ego.motion.speed_mps.min(speed_mps);
+        world
+    }
+
+    /// Whether a road user lies across the strip that the ego vehicle drives on, before its front.
+    pub fn is_in_the_way(&self, obstacle: &Obstacle) -> bool {
+        room_before_m(obstacle, &self.alone()).is_some()
+    }
+
+    /// Whether the ego vehicle is over a line of its lane: in a lane change, or astray.
+    pub fn is_between_lanes(&self) -> bool {
+        let half_m = self.scene.half_width_m(self.ego_station_m);
+        self.ego_offset_m.abs() + VehicleParameters::MKZ.width_m / 2.0 > half_m
+    }
+
+    /// The colour of the light that holds for a crosswalk of the route, which begins at a station.
+    pub fn light_before(&self, crosswalk_m: f64) -> Option<SignalColour> {
+        light_before(crosswalk_m, &self.alone())
+    }
+
+    /// Whether the ego vehicle is in a junction that it entered past a stop sign without having stood.
+    pub fn ego_runs_stop(&self) -> bool {
+        self.ego_passed.is_running_stop(&self.scene.map, &self.ego.outline)
+    }
+
+    /// As [`World::ego_runs_stop`], of the road user with an id.
+    pub fn runs_stop(&self, id: u32) -> bool {
         let user = self.users.iter().find(|user| user.obstacle.id == id);
-        let passed = user.and_then(|user| Some((user.mover.rights.passed?, &user.obstacle.outline)));
-        passed.is_some_and(|(passed, outline)| passed.is_being_run(&self.scene.map, outline))
+        user.is_some_and(|RoadUser { obstacle, mover }| {
+            mover.rights.passed.is_running_stop(&self.scene.map, &obstacle.outline)
+        })
+    }
+
+    /// Whether the road user with an id drives a lane change.
+    pub fn changes_lanes(&self, id: u32) -> bool {
+        let user = self.users.iter().find(|user| user.obstacle.id == id);
+        user.is_some_and(|user| user.mover.is_changing_lanes())
+    }
+
+    /// Whether the road user with an id drives into a junction across the route of the ego vehicle, which goes first there.
+    pub fn intrudes(&self, id: u32) -> bool {
+        let around = self.alone();
+        let user = self.users.iter().find(|user| user.obstacle.id == id);
+        user.is_some_and(|RoadUser { obstacle, mover }| {
+            mover.rights.is_intruding(obstacle, &mover.motion, &self.ego_passed, &around)
+        })
+    }
+
+    /// As [`World::ego_runs`], of the road user with an id.
+    pub fn runs(&self, id: u32) -> bool {
+        let user = self.users.iter().find(|user| user.obstacle.id == id);
+        user.is_some_and(|user| user.mover.rights.passed.is_running(&self.scene.map, &user.obstacle.outline))
     }
 
     /// Whether the ego vehicle has left its lane without a contact: the middle of its rear axle is beside it. During a
@@ -609,7 +673,7 @@ impl World {
                 mover.rights.watch_wreck(obstacle, &around);
             } else {
                 let in_sight = around.is_in_sight(obstacle, mover.visible_fraction);
-                mover.rights.watch(obstacle, &mover.motion, self.ego_passed, in_sight, &around);
+                mover.rights.watch(obstacle, &mover.motion, &self.ego_passed, in_sight, &around);
             }
         }
         self.users = users;
@@ -657,8 +721,8 @@ impl World {
         let other = Party { sweep, velocity_mps: moved.velocity_mps };
         if let Some((contact, normal)) = meet(&ego.party, ego.speed_mps, &other, before.id, self.ticks) {
             let around = self.around([&[], &[]]);
-            let priority = if mover.has_crashed() {
-                mover.rights.at_contact_with_wreck(obstacle)
+            let ruling = if mover.has_crashed() {
+                mover.rights.at_contact_with_wreck(obstacle, &around)
             } else {
                 mover.rights.at_contact(obstacle, &mover.motion, contact.point, &around)
             };
@@ -669,10 +733,14 @@ impl World {
             let this = (VehicleParameters::MKZ.mass_t, now_mps);
             let that = (mover.size.mass_t, moved.velocity_mps);
             let (ego_mps, other_mps) = exchange(normal, closing_mps, this, that);
-            self.ego.motion.speed_mps = self.ego.frame.forward().dot(&ego_mps).max(0.0);
+            let after_mps = self.ego.frame.forward().dot(&ego_mps).max(0.0);
+            if after_mps > self.ego.motion.speed_mps {
+                self.pushed_until = self.ticks + PUSHED_TICKS;
+            }
+            self.ego.motion.speed_mps = after_mps;
             self.ego.motion.touched = true;
             mover.touch(moved.forward.dot(&other_mps).max(0.0));
-            self.contacts.push(Contact { priority, ..contact });
+            self.contacts.push(Contact { ruling, ..contact });
         }
         true
     }
@@ -709,13 +777,20 @@ impl World {
         self.ego_offset_m = found.offset_m;
         self.ego_elevation_m = route.height_at(&self.scene.map, found.station_m);
         let passed = front_before_m..self.ego_front_m();
-        let colour = |signal| self.signal(signal);
-        let light = PassedLight::between(&route.stop_lines, passed.start, passed.end, colour);
-        self.ego_passed = light.or(self.ego_passed);
+        if self.ticks < self.pushed_until {
+            // What another vehicle pushes over a line has not passed it.
+            return;
+        }
+        let mut ego_passed = self.ego_passed;
+        let stops = route.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
+        let stops = stops.map(|line| (line.station_m, route.lane_at(line.station_m).lane));
+        let (speed_mps, around) = (self.ego.motion.speed_mps, self.alone());
+        ego_passed.pass(&route.stop_lines, stops, (passed.start, passed.end), speed_mps, &around);
         self.red_runs += route
             .stop_lines
             .iter()
             .filter(|line| passed.contains(&line.station_m) && self.signal(line.signal) == SignalColour::Red)
             .count() as u32;
+        self.ego_passed = ego_passed;
     }
 }

@@ -68,6 +68,8 @@ export interface Finding {
   letter: string[];
   evasion: string | null;
   priority: string;
+  /** Who had priority, by which rule, since when, and whose motion decided. */
+  ruling: string;
   side: string;
   approach: string;
   ego_mps: number;

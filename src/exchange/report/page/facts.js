@@ -4,7 +4,6 @@ import { linkOf, nameOf } from "./link.js";
 import {
   ENDS,
   HARMS,
-  PRIORITIES,
   PROC,
   VERDICTS,
   atTime,
@@ -89,7 +88,7 @@ function verdict(recording, collision, seek, watchDrivers) {
   const rows = [
     ["Verdict", `${says}: ${VERDICTS[collision.class]}`],
     ...again(collision),
-    ["Priority", PRIORITIES[collision.priority]],
+    ["Priority", collision.ruling],
     ["Harm", `${collision.harm}: ${HARMS[collision.harm]}`],
     ["Cause", causeInWords(collision.cause)],
     ["Held by, at contact", collision.held ?? "nothing"],

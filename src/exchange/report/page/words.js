@@ -8,12 +8,6 @@ export const VERDICTS = {
   unavoidable: "no driver that was tried avoids it",
 };
 
-export const PRIORITIES = {
-  ego: "the ego vehicle had priority",
-  other: "the other had priority",
-  none: "neither had priority",
-};
-
 export const DRIVERS = {
   cc: "careful driver (UN R157)",
   fsm: "fuzzy safety model (UN R157)",

@@ -76,7 +76,7 @@ fn a_vehicle_that_turns_across_gives_way_and_so_does_the_ego_vehicle() {
     drive_to(&mut world, 80.0, 10.0);
     world.put("3", 1, "8", 193.0, 7.0);
     let met = contact(&mut world, 10.0);
-    assert_eq!(met.priority, Priority::Ego, "{met:?}");
+    assert_eq!(met.ruling.priority, Priority::Ego, "{met:?}");
     assert!(met.on_ego.x > 2.0, "it is hit by the front of the ego vehicle: {met:?}");
 
     // The ego vehicle turns left at 5 m/s before one that comes straight on at 10 m/s.
@@ -84,7 +84,7 @@ fn a_vehicle_that_turns_across_gives_way_and_so_does_the_ego_vehicle() {
     drive_to(&mut world, 90.0, 5.0);
     world.put("3", 1, "2", 173.0, 10.0);
     let met = contact(&mut world, 5.0);
-    assert_eq!(met.priority, Priority::Other, "{met:?}");
+    assert_eq!(met.ruling.priority, Priority::Other, "{met:?}");
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn a_vehicle_that_stands_in_the_junction_has_given_way_long_ago() {
     drive_to(&mut world, 20.0, 8.0);
     world.put("3", 1, "8", 208.0, 0.3);
     let met = contact(&mut world, 8.0);
-    assert_eq!(met.priority, Priority::Other, "{met:?}");
+    assert_eq!(met.ruling.priority, Priority::Other, "{met:?}");
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn a_red_light_is_remembered_until_the_contact() {
     assert!((world.time_s() - 8.5).abs() < 1.5, "{}", world.time_s());
     world.put("4", -1, "5", 240.0, 8.0);
     let met = contact(&mut world, 15.0);
-    assert_eq!((met.priority, world.red_runs()), (Priority::Other, 1), "{met:?}");
+    assert_eq!((met.ruling.priority, world.red_runs()), (Priority::Other, 1), "{met:?}");
 }
 
 #[test]
@@ -112,7 +112,7 @@ fn of_two_in_a_lane_the_one_ahead_has_priority() {
     let mut world = testing::world(&testing::straight());
     drive_to(&mut world, 60.0, 10.0);
     world.apply(&Effect::Spawn(request(Verb::DriveAhead, 30.0, 4.0))).expect("there is room");
-    assert_eq!(contact(&mut world, 10.0).priority, Priority::Other);
+    assert_eq!(contact(&mut world, 10.0).ruling.priority, Priority::Other);
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn one_who_cuts_in_gives_way_unless_there_is_room() {
         let cuts_in =
             SpawnRequest { lane, then: Then::Change, ..request(Verb::DriveAhead, distance_m, speed_mps) };
         world.apply(&Effect::Spawn(cuts_in)).expect("there is room");
-        contact(&mut world, 12.0).priority
+        contact(&mut world, 12.0).ruling.priority
     };
     assert_eq!(cuts_in(22.0, 5.0), Priority::Ego);
     assert_eq!(cuts_in(75.0, 8.0), Priority::Other);
@@ -139,12 +139,13 @@ fn one_who_cuts_in_and_stops_has_not_given_way_before_the_distance_is_back() {
         along: 1.0,
         ego_mps: 10.0,
         other_mps,
-        ego_towards_mps: 0.0,
-        other_towards_mps: 1.0,
+        ego_does: None,
+        other_does: Some(Rule::LeavingLane),
     };
+    let coming = |side: Side| side.at_coming(|| None, 0.0).map(|ruling| ruling.priority);
     // As fast as the ego vehicle, less than a second before it.
-    assert_eq!(side(4.0, 10.0).at_coming(true, || None), Some(Priority::Ego));
-    assert_eq!(side(11.0, 10.0).at_coming(true, || None), None);
+    assert_eq!(coming(side(4.0, 10.0)), Some(Priority::Ego));
+    assert_eq!(coming(side(11.0, 10.0)), None);
     // What was found stays while it brakes to rest, and until there is room to brake gently for it.
     assert!(!side(4.0, 10.0).is_gentle() && !side(6.0, 5.0).is_gentle() && !side(4.0, 0.0).is_gentle());
     assert!(side(22.0, 0.0).is_gentle());
@@ -156,7 +157,7 @@ fn on_foot_the_crosswalk_decides_and_elsewhere_the_time_to_brake() {
         let mut world = testing::world(scene);
         drive_to(&mut world, 60.0, 11.0);
         world.apply(&Effect::Spawn(request(verb, distance_m, 1.4))).expect("there is room");
-        contact(&mut world, 11.0).priority
+        contact(&mut world, 11.0).ruling.priority
     };
     // 11 m/s: 4.4 m until the brakes act, and 8 m to stop.
     let street = testing::straight();

@@ -40,6 +40,7 @@ impl World {
             ego_elevation_m: self.ego_elevation_m,
             red_runs: self.red_runs,
             ego_passed: self.ego_passed,
+            pushed_until: self.pushed_until,
             contacts: Vec::new(),
             ..recorded.clone()
         };

@@ -49,7 +49,7 @@ fn a_wreck_has_priority_unless_it_came_to_lie_there_too_late() {
         user.mover.crash(9);
         loop {
             if let Some(contact) = world.tick(&drives(&world)).first() {
-                return contact.priority;
+                return contact.ruling.priority;
             }
             assert!(world.time_s() < 60.0);
         }

@@ -1,0 +1,92 @@
+//! How fast a careful driver would have been going: within the limit, within its sight, and so that it can stop for a person who
+//! waits at a crosswalk.
+//!
+//! A driver that was faster is judged as accident analysts do: from the same place, at the speed that was allowed there
+//! ("avoidable at the permitted speed").
+
+use avastra_base::kinematics::{
+    CAREFUL_BRAKING_MPS2, CAREFUL_DELAY_S, CAREFUL_JERK_MPS3, GRAVITY_MPS2, STANDING_MPS,
+};
+use avastra_lang::model::vocabulary::Body;
+use avastra_world::sim::{Obstacle, SignalColour, VehicleParameters, World};
+
+/// A driver that is faster by no more than this keeps to a speed, m/s: as `keeps_the_limit` has it.
+const TOLERANCE_MPS: f64 = 1.0;
+/// A person no farther from a crosswalk waits to cross on it, m. Ours.
+const WAITS_M: f64 = 1.5;
+/// Braking before a crosswalk at which a person waits, m/s²: that of a comfortable stop. Ours.
+const GENTLE_MPS2: f64 = 3.0;
+/// From what comes into sight until full braking, s: half of the time in which braking builds up counts as none.
+const DELAY_S: f64 = CAREFUL_DELAY_S + CAREFUL_BRAKING_MPS2 / CAREFUL_JERK_MPS3 / 2.0;
+/// A careful driver that sees no farther than this keeps a car's width of it in hand, m. Ours.
+const SPARE_M: f64 = 2.0;
+
+/// The speed at which a careful driver goes here, m/s.
+pub fn careful_mps(world: &World) -> f64 {
+    let scene = world.scene();
+    let limit_mps = scene.map.lane(scene.route.lane_at(world.ego_station_m()).lane).speed_limit_mps;
+    let conditions = world.conditions();
+    let braking_mps2 = CAREFUL_BRAKING_MPS2.min(conditions.friction * GRAVITY_MPS2);
+    let sight_mps = stops_within_mps(conditions.visibility_m - SPARE_M, braking_mps2);
+    limit_mps.min(sight_mps).min(crosswalk_mps(world))
+}
+
+/// The speed that the ego vehicle has, unless it is faster than a careful driver would be.
+pub fn lawful_mps(world: &World) -> f64 {
+    let (own_mps, careful_mps) = (world.ego().speed_mps, careful_mps(world));
+    if own_mps > careful_mps + TOLERANCE_MPS { careful_mps } else { own_mps }
+}
+
+/// The speed from which a driver stops for those who wait at the next crosswalk, m/s; infinite where nobody does.
+fn crosswalk_mps(world: &World) -> f64 {
+    let front_m = VehicleParameters::MKZ.front_m(world.ego_station_m());
+    let Some((begin_m, _)) = next_crosswalk(world) else { return f64::INFINITY };
+    match world.obstacles().any(|obstacle| waits_at_crosswalk(world, obstacle)) {
+        true => stops_within_mps((begin_m - front_m).max(0.0), GENTLE_MPS2),
+        false => f64::INFINITY,
+    }
+}
+
+/// Whether a person stands at the next crosswalk of the route, or is on it.
+pub fn waits_at_crosswalk(world: &World, obstacle: &Obstacle) -> bool {
+    let Some((begin_m, end_m)) = next_crosswalk(world) else { return false };
+    obstacle.body == Body::Pedestrian
+        && obstacle.velocity_mps.norm() < STANDING_MPS
+        && world.scene().crosswalk_gap_m(obstacle.outline.pose.position) <= WAITS_M
+        && {
+            let path = &world.scene().route.path;
+            let station_m = path.project_near(obstacle.outline.pose.position, begin_m, 20.0).station_m;
+            (begin_m - WAITS_M..end_m + WAITS_M).contains(&station_m)
+        }
+}
+
+/// The next crosswalk before the front, unless a light there is green for the ego vehicle.
+fn next_crosswalk(world: &World) -> Option<(f64, f64)> {
+    let front_m = VehicleParameters::MKZ.front_m(world.ego_station_m());
+    let route = &world.scene().route;
+    let next = route.crosswalks_m.iter().copied().find(|(begin_m, _)| *begin_m > front_m);
+    next.filter(|(begin_m, _)| world.light_before(*begin_m) != Some(SignalColour::Green))
+}
+
+/// The speed from which a driver stops within a distance, m/s.
+fn stops_within_mps(room_m: f64, braking_mps2: f64) -> f64 {
+    // v t + v² / 2a = room.
+    let delay_mps = DELAY_S * braking_mps2;
+    (delay_mps * delay_mps + 2.0 * braking_mps2 * room_m.max(0.0)).sqrt() - delay_mps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use avastra_base::kinematics::stopping_m;
+
+    #[test]
+    fn a_driver_stops_within_the_distance_from_the_speed_that_it_gives() {
+        for room_m in [0.0, 1.0, 26.4, 50.0, 300.0] {
+            for braking_mps2 in [3.0, 7.6] {
+                let mps = stops_within_mps(room_m, braking_mps2);
+                assert!((stopping_m(mps, DELAY_S, braking_mps2) - room_m).abs() < 1e-9);
+            }
+        }
+    }
+}

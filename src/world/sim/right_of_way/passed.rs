@@ -1,0 +1,215 @@
+//! The lines that a vehicle passed last: whether it was allowed to.
+
+use avastra_base::geometry::OrientedBox;
+use avastra_lang::model::vocabulary::Priority;
+use avastra_road::{LaneIndex, RoadMap, SignKind, StopLine};
+
+use super::Rule;
+use crate::sim::around::Around;
+use crate::sim::road_user::{Moved, Obstacle};
+use crate::sim::sense::SignalColour;
+use crate::sim::trace::Trace;
+use crate::sim::world::ticks;
+
+/// A driver needs this long to react to yellow, s: the time by which yellow is set (ITE; German RiLSA), as is the braking.
+const YELLOW_REACTION_S: f64 = 1.0;
+const YELLOW_BRAKING_MPS2: f64 = 3.5;
+/// A vehicle that is slower stands, m/s: as `stops_at_signs` asks.
+const STOOD_MPS: f64 = 0.3;
+/// To have stood before a sign means within this time, s.
+const STOOD_S: f64 = 5.0;
+/// Of two that stood at their signs, one was first if it stood earlier by more than this, s. Ours.
+const FIRST_S: f64 = 1.0;
+
+/// What a light showed as a vehicle passed it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Shown {
+    Free,
+    /// Yellow for so long that the vehicle could have stopped.
+    LateYellow,
+    Red,
+}
+
+/// The light at the stop line that a vehicle passed last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct PassedLight {
+    signal: usize,
+    shown: Shown,
+}
+
+/// The stop sign that a vehicle passed last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct PassedSign {
+    lane: LaneIndex,
+    /// When it last stood before the line, ticks; `None` if it did not.
+    stood: Option<u64>,
+}
+
+/// The lines that a vehicle passed last.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(in crate::sim) struct Passed {
+    light: Option<PassedLight>,
+    sign: Option<PassedSign>,
+    /// When it last stood, ticks.
+    stood: Option<u64>,
+}
+
+impl Passed {
+    /// Notes the lines that lie between two stations of a front: lights, and stop signs with the lanes that they stand on.
+    /// `speed_mps`: of the vehicle.
+    pub fn pass(
+        &mut self,
+        lights: &[StopLine],
+        mut stops: impl Iterator<Item = (f64, LaneIndex)>,
+        (from_m, to_m): (f64, f64),
+        speed_mps: f64,
+        around: &Around,
+    ) {
+        if speed_mps <= STOOD_MPS {
+            self.stood = Some(around.tick);
+        }
+        let passed = from_m..to_m;
+        if let Some(line) = lights.iter().rfind(|line| passed.contains(&line.station_m)) {
+            self.light =
+                Some(PassedLight { signal: line.signal, shown: shown(line.signal, speed_mps, around) });
+        }
+        if let Some((_, lane)) = stops.find(|(station_m, _)| passed.contains(station_m)) {
+            let stood = self.stood.filter(|tick| around.tick - tick <= ticks(STOOD_S));
+            self.sign = Some(PassedSign { lane, stood });
+        }
+    }
+
+    /// As [`Passed::pass`], of a vehicle that keeps to no lanes: the lines are those of the lane under its front.
+    pub fn pass_freely(&mut self, this: &Obstacle, moved: &Moved, around: &Around) {
+        let speed_mps = this.velocity_mps.norm();
+        if speed_mps <= STOOD_MPS {
+            self.stood = Some(around.tick);
+        }
+        let along_m = this.forward.dot(&(moved.pose.position - this.outline.pose.position));
+        if !this.body.is_vehicle() || along_m <= 0.0 {
+            return;
+        }
+        let map = &around.scene.map;
+        let front = this.outline.pose.offset(this.outline.half_length_m, 0.0);
+        let Some(place) = map.nearest(front.position, front.heading_rad, 0.0) else { return };
+        let lane = map.lane(place.lane);
+        let stops = lane.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
+        let stops = stops.map(|line| (line.station_m, place.lane));
+        self.pass(&lane.stop_lines, stops, (place.station_m, place.station_m + along_m), speed_mps, around);
+    }
+
+    /// Whether the light was red, and the body is still in the junction behind it.
+    pub fn is_running_red(&self, map: &RoadMap, outline: &OrientedBox) -> bool {
+        self.light.is_some_and(|light| light.shown == Shown::Red && light.is_at(map, outline))
+    }
+
+    /// As [`Passed::is_running_red`], for a late yellow light, too, and for a stop sign that was passed without standing.
+    pub fn is_running(&self, map: &RoadMap, outline: &OrientedBox) -> bool {
+        let light = self.light.filter(|light| light.shown != Shown::Free);
+        light.is_some_and(|light| light.is_at(map, outline)) || self.is_running_stop(map, outline)
+    }
+
+    /// Whether the vehicle passed a stop sign without having stood, and is still in the junction behind it.
+    pub fn is_running_stop(&self, map: &RoadMap, outline: &OrientedBox) -> bool {
+        let Some(PassedSign { lane, stood: None }) = self.sign else { return false };
+        let here = map.nearest(outline.pose.position, outline.pose.heading_rad, 0.0);
+        let is_before = |here: LaneIndex| here == lane || map.approach(here).any(|before| before == lane);
+        here.is_some_and(|here| is_before(here.lane))
+    }
+
+    /// Whether the vehicle stood within the last seconds.
+    pub(super) fn has_just_stood(&self, around: &Around) -> bool {
+        self.stood.is_some_and(|tick| around.tick - tick <= ticks(STOOD_S))
+    }
+
+    /// Whether the vehicle passed the light of a lane in a junction though it could have stopped, or still has it red
+    /// before it.
+    pub(super) fn ran_light(&self, lane: LaneIndex, around: &Around) -> bool {
+        let map = &around.scene.map;
+        map.stop_line_of(lane).is_some_and(|line| {
+            let junction = |signal: usize| map.signals[signal].junction;
+            match self.light.filter(|light| junction(light.signal) == junction(line.signal)) {
+                Some(light) => light.shown != Shown::Free,
+                // It has not come to its light yet, or was there before its light was looked at.
+                None => around.signals.colour(map, line.signal, around.tick) == SignalColour::Red,
+            }
+        })
+    }
+
+    /// The stop sign before a lane in a junction.
+    fn stop_before(&self, lane: LaneIndex, map: &RoadMap) -> Stop {
+        let has_stop =
+            |lane: LaneIndex| map.lane(lane).sign_lines.iter().any(|line| line.kind == SignKind::Stop);
+        if !map.approach(lane).any(has_stop) {
+            return Stop::None;
+        }
+        let passed = self.sign.filter(|sign| map.approach(lane).any(|approach| approach == sign.lane));
+        passed.map_or(Stop::Ahead, |sign| sign.stood.map_or(Stop::Ran, Stop::Stood))
+    }
+
+    /// Signs are left out: what is known of them follows from what was traced before.
+    pub fn trace(&self, trace: &mut Trace) {
+        let Passed { light, sign: _, stood: _ } = self;
+        let code = |light: &PassedLight| match light.shown {
+            Shown::Free => 0,
+            Shown::Red => 1,
+            Shown::LateYellow => 1 << 32,
+        };
+        trace.word(light.as_ref().map_or(0, |light| 2 + 2 * light.signal as u64 + code(light)));
+    }
+}
+
+impl PassedLight {
+    /// Whether a body is still in the junction behind it.
+    fn is_at(&self, map: &RoadMap, outline: &OrientedBox) -> bool {
+        let here = map.nearest(outline.pose.position, outline.pose.heading_rad, 0.0);
+        let junction = map.signals[self.signal].junction;
+        junction.is_some() && here.is_some_and(|here| map.lane(here.lane).junction == junction)
+    }
+}
+
+/// How a vehicle stands to the stop sign of its approach.
+enum Stop {
+    None,
+    /// It has not passed it yet.
+    Ahead,
+    Ran,
+    /// It stood before it, at this tick.
+    Stood(u64),
+}
+
+/// Who goes first where both lanes have stop signs, or one of the vehicles ran its sign; `None` where that decides nothing.
+pub(super) fn by_stops(
+    [ego, other]: [LaneIndex; 2],
+    passed: [&Passed; 2],
+    map: &RoadMap,
+) -> Option<(Priority, Rule)> {
+    let stops = (passed[0].stop_before(ego, map), passed[1].stop_before(other, map));
+    let found = |priority, rule| Some((priority, rule));
+    match stops {
+        (Stop::Ran, Stop::Ran) => found(Priority::None, Rule::StopSign),
+        (Stop::Ran, _) => found(Priority::Other, Rule::StopSign),
+        (_, Stop::Ran) => found(Priority::Ego, Rule::StopSign),
+        (Stop::Ahead, Stop::Stood(_)) => found(Priority::Other, Rule::FirstToStop),
+        (Stop::Stood(_), Stop::Ahead) => found(Priority::Ego, Rule::FirstToStop),
+        (Stop::Stood(a), Stop::Stood(b)) if a + ticks(FIRST_S) < b => found(Priority::Ego, Rule::FirstToStop),
+        (Stop::Stood(a), Stop::Stood(b)) if b + ticks(FIRST_S) < a => {
+            found(Priority::Other, Rule::FirstToStop)
+        }
+        _ => None,
+    }
+}
+
+/// What a light shows a vehicle that passes it now.
+fn shown(signal: usize, speed_mps: f64, around: &Around) -> Shown {
+    let map = &around.scene.map;
+    match around.signals.colour(map, signal, around.tick) {
+        SignalColour::Red => Shown::Red,
+        SignalColour::Yellow => {
+            let (since, _) = around.signals.around(map, signal, around.tick);
+            let stops_s = YELLOW_REACTION_S + speed_mps / (2.0 * YELLOW_BRAKING_MPS2);
+            if since > ticks(stops_s) { Shown::LateYellow } else { Shown::Free }
+        }
+        SignalColour::Green => Shown::Free,
+    }
+}

@@ -1,0 +1,165 @@
+//! Why a vehicle has priority: the rule, the moment, and whose motion decided.
+
+use avastra_lang::model::vocabulary::Priority;
+
+/// The rules by which priority is decided. Articles are those of the Vienna Convention on Road Traffic (1968).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rule {
+    /// Neither came into the other's way by any of these rules.
+    #[default]
+    None,
+    Siren,
+    Light,
+    BothLights,
+    StopSign,
+    FirstToStop,
+    Sign,
+    Turning,
+    FromTheRight,
+    SameSide,
+    Clearing,
+    Backing,
+    Entering,
+    TurningRound,
+    LeavingLane,
+    BothLeaveLanes,
+    Middle,
+    BothBeyondMiddle,
+    Distance,
+    Overtaking,
+    Standing,
+    Wreck,
+    Crosswalk,
+    SteppingOut,
+    OnFoot,
+}
+
+impl Rule {
+    /// The rule in a word, as it stands in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Rule::None => "none",
+            Rule::Siren => "siren",
+            Rule::Light => "light",
+            Rule::BothLights => "both_lights",
+            Rule::StopSign => "stop_sign",
+            Rule::FirstToStop => "first_to_stop",
+            Rule::Sign => "sign",
+            Rule::Turning => "turning",
+            Rule::FromTheRight => "from_the_right",
+            Rule::SameSide => "same_side",
+            Rule::Clearing => "clearing",
+            Rule::Backing => "backing",
+            Rule::Entering => "entering",
+            Rule::TurningRound => "turning_round",
+            Rule::LeavingLane => "leaving_lane",
+            Rule::BothLeaveLanes => "both_leave_lanes",
+            Rule::Middle => "middle",
+            Rule::BothBeyondMiddle => "both_beyond_middle",
+            Rule::Distance => "distance",
+            Rule::Overtaking => "overtaking",
+            Rule::Standing => "standing",
+            Rule::Wreck => "wreck",
+            Rule::Crosswalk => "crosswalk",
+            Rule::SteppingOut => "stepping_out",
+            Rule::OnFoot => "on_foot",
+        }
+    }
+
+    /// The rule in a sentence, with its article.
+    pub fn text(self) -> &'static str {
+        match self {
+            Rule::None => "no rule of the road tells them apart",
+            Rule::Siren => "an emergency vehicle under way goes first (article 34)",
+            Rule::Light => {
+                "a vehicle that passes a red light, or yellow though it could stop, gives way (article 23)"
+            }
+            Rule::BothLights => "both passed a red light (article 23)",
+            Rule::StopSign => {
+                "a vehicle that passes its stop sign without standing gives way (article 10 of the signs)"
+            }
+            Rule::FirstToStop => "of two that stop at signs, the one that stood first goes first",
+            Rule::Sign => "signs say which road gives way (article 18)",
+            Rule::Turning => {
+                "a vehicle that turns across the road gives way to oncoming traffic (article 16)"
+            }
+            Rule::FromTheRight => "the vehicle that comes from the nearside goes first (article 18)",
+            Rule::SameSide => "of two from one side, the one that turns less goes first",
+            Rule::Clearing => "a vehicle that entered in good time may clear the junction (article 18)",
+            Rule::Backing => "a vehicle that backs up gives way (article 14)",
+            Rule::Entering => "a vehicle that comes from beside the road gives way (article 12)",
+            Rule::TurningRound => "a vehicle that turns round or crosses the lanes gives way (article 14)",
+            Rule::LeavingLane => "a vehicle that leaves its lane gives way (articles 11 and 14)",
+            Rule::BothLeaveLanes => "both leave their lanes (article 14)",
+            Rule::Middle => "a vehicle beyond the middle of the road gives way (articles 10 and 12)",
+            Rule::BothBeyondMiddle => "both are beyond the middle of the road (articles 10 and 12)",
+            Rule::Distance => "a vehicle behind another keeps its distance (article 13)",
+            Rule::Overtaking => "a vehicle that passes another leaves room (article 11)",
+            Rule::Standing => "a driver stops for a vehicle that stands in sight (article 13)",
+            Rule::Wreck => "a driver stops for a wreck in sight (article 13)",
+            Rule::Crosswalk => "a pedestrian on a crosswalk goes first (article 21)",
+            Rule::SteppingOut => "a pedestrian does not step out too near (article 20)",
+            Rule::OnFoot => {
+                "a pedestrian crosses with regard, a driver stops for one in sight (articles 13, 20 and 21)"
+            }
+        }
+    }
+}
+
+/// Whose motion decided: who came into the other's way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Mover {
+    Ego,
+    Other,
+    #[default]
+    Both,
+}
+
+impl Mover {
+    pub fn name(self) -> &'static str {
+        match self {
+            Mover::Ego => "ego",
+            Mover::Other => "other",
+            Mover::Both => "both",
+        }
+    }
+}
+
+/// Who has priority, and why.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Ruling {
+    pub priority: Priority,
+    pub rule: Rule,
+    pub mover: Mover,
+    /// When the first of the two came into the other's way, s since the episode began.
+    pub time_s: f64,
+}
+
+impl Ruling {
+    /// Whether the ego vehicle was where it was not allowed to be, whoever else was.
+    pub fn is_ego_wrong(&self) -> bool {
+        let both = match self.rule {
+            Rule::BothLights | Rule::BothLeaveLanes | Rule::BothBeyondMiddle => true,
+            Rule::StopSign => self.priority == Priority::None,
+            _ => false,
+        };
+        both || self.priority == Priority::Other
+    }
+
+    /// Who has priority, and why, in a sentence without a full stop: `the other had priority: …`.
+    pub fn describe(&self) -> String {
+        let who = match self.priority {
+            Priority::Ego => "the ego vehicle had priority",
+            Priority::Other => "the other had priority",
+            Priority::None => "neither had priority",
+        };
+        let came = match self.mover {
+            Mover::Ego => "the ego vehicle came into its way",
+            Mover::Other => "it came into the ego vehicle's way",
+            Mover::Both => "they met",
+        };
+        format!("{who}: {}; at {:.1} s {came}", self.rule.text(), self.time_s)
+    }
+}
