@@ -41,6 +41,7 @@ mod road;
 mod rules;
 mod scaling_maps;
 mod shards;
+mod situations;
 mod studies;
 mod suites;
 mod surveys;

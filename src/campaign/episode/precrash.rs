@@ -553,7 +553,8 @@ mod tests {
         // Hit from behind: the ego vehicle is the one ahead.
         let behind = before([at(-30.0, 0.0, 0.0, 16.0), at(46.0, 0.0, 0.0, 14.0)]);
         assert_eq!(behind.kind(), PreCrash::LeadSlower);
-        let cut_in = before([at(10.0, 3.5, 0.0, 9.0), at(54.0, 0.0, 0.0, 8.0)]);
+        let mut cut_in = before([at(10.0, 3.5, 0.0, 9.0), at(54.0, 0.0, 0.0, 8.0)]);
+        cut_in.other.steps[0].place.velocity_mps.y = -1.5;
         assert_eq!(cut_in.kind(), PreCrash::ChangingLanesSameDirection);
         let beside =
             Before { is_lengthwise: false, ..before([at(0.0, 2.5, 0.0, 10.0), at(50.0, 1.9, 0.0, 10.0)]) };
@@ -567,6 +568,7 @@ mod tests {
         assert_eq!((comes_over(1.5), comes_over(0.6)), (Some(18), Some(19)));
         let mut swerve = before([at(40.0, 3.5, 0.0, 2.0), at(54.0, 3.5, 0.0, 2.0)]);
         swerve.ego.steps[1].place = at(50.0, 3.5, 0.0, 10.0);
+        swerve.ego.steps[0].place.velocity_mps.y = 1.5;
         assert_eq!(swerve.kind(), PreCrash::FollowingVehicleManoeuvre);
     }
 
@@ -580,7 +582,10 @@ mod tests {
         assert_eq!(Before { is_wreck: true, ran_red: true, ..crossing.clone() }.kind(), PreCrash::Wreck);
         assert_eq!(Before { has_failed: true, ran_red: true, ..crossing }.kind(), PreCrash::VehicleFailure);
         let oncoming = before([at(100.0, 3.0, 180.0, 8.0), at(54.0, 0.5, 180.0, 8.0)]);
-        assert_eq!(oncoming.kind(), PreCrash::ManoeuvreOppositeDirection);
+        assert_eq!(oncoming.kind(), PreCrash::NoManoeuvreOppositeDirection, "it drifts");
+        let mut overtakes = oncoming.clone();
+        overtakes.other.intends = Some(Manoeuvre::LaneChange);
+        assert_eq!(overtakes.kind(), PreCrash::ManoeuvreOppositeDirection);
         let turned = [at(80.0, 3.5, 180.0, 6.0), at(52.0, 0.0, -90.0, 6.0)];
         let left = at_junction(before(turned));
         assert_eq!(left.kind(), PreCrash::LeftTurnAcrossPath);
@@ -629,6 +634,7 @@ mod tests {
         assert_eq!(along(skids).kind().number(), Some(3));
         let mut after_a_change = along(Step { place: Place { pose: skewed, ..street.place }, ..street });
         after_a_change.other.steps[0].place = at(-10.0, 3.5, 0.0, 15.0);
+        after_a_change.other.steps[0].place.velocity_mps.y = -1.5;
         after_a_change.other.steps.insert(1, Step { place: at(10.0, 0.0, 0.0, 15.0), ..street });
         assert_eq!(after_a_change.kind().number(), Some(2));
         let beside = Step { place: at(20.0, -3.0, 0.0, 15.0), off_road_m: 1.0, ..street };
@@ -636,6 +642,7 @@ mod tests {
         assert_ne!(along(Step { in_junction: true, ..beside }).kind().number(), Some(7));
         let mut changed = along(beside);
         changed.other.steps.insert(1, Step { place: at(10.0, -3.5, 0.0, 15.0), ..street });
+        changed.other.steps[0].place.velocity_mps.y = -1.5;
         assert_eq!(changed.kind().number(), Some(6));
         assert_eq!(along(Step { place: at(20.0, -3.0, 180.0, -5.0), ..beside }).kind().number(), Some(8));
 
@@ -648,6 +655,7 @@ mod tests {
         // A vehicle beside the ego vehicle comes over because somebody stands before it: late, or in good time.
         let comes = |stands_m: f64| {
             let mut before = before([at(10.0, 3.5, 0.0, 10.0), at(52.0, 1.0, 0.0, 9.0)]);
+            before.other.steps[0].place.velocity_mps.y = -1.5;
             before.third[0].push(at(stands_m, 3.5, 0.0, 0.0));
             before.kind()
         };

@@ -135,12 +135,16 @@ fn the_hazard_of_a_pedestrian_begins_with_the_first_step() {
 #[test]
 fn what_was_never_in_sight_has_no_onset() {
     let mut hidden = world();
-    vehicle(&mut hidden, 20.0, 0.5);
+    vehicle(&mut hidden, 20.0, 5.0);
     let met = hidden.ego_outline();
-    assert_eq!(onset(&[hidden.clone()], 1, met), None, "20 m away and no way leads there");
+    assert_eq!(onset(&[hidden.clone()], 1, met), None, "20 m away, under way, and no way leads there");
     let there = hidden.obstacle(1).expect("it was put there").outline;
     assert_eq!(onset(&[hidden.clone()], 1, there), Some(Onset { first: 0, conflict: 0 }));
     assert_eq!(onset(&[hidden], 2, there), None, "no obstacle has that number");
+    let mut creeps = world();
+    vehicle(&mut creeps, 20.0, 0.5);
+    let seen = Some(Onset { first: 0, conflict: 0 });
+    assert_eq!(onset(&[creeps], 1, met), seen, "what creeps in the way is in it from the moment it is seen");
 }
 
 /// IDM that sees no other road user.

@@ -1,0 +1,176 @@
+//! Situations that analysts labelled (`tests/cases/situations`): those that the shipped `blind` driver plays. The rest needs
+//! Python: `tests/interop/situations.py`.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use rusqlite::{Connection, OpenFlags};
+
+use crate::cases::root;
+
+/// Requirements that the law gained after the labels were written: no label can have named them.
+const NEWER: [&str; 6] = [
+    "drives_by_sight",
+    "goes_at_green",
+    "lets_traffic_flow",
+    "stays_on_the_road",
+    "stops_at_yellow",
+    "takes_its_turns",
+];
+
+/// Where avastra says otherwise than every analyst, and why it does.
+const ARGUED: [(&str, &str); 2] = [
+    (
+        "i09_ball_and_child",
+        "a ball that has rolled off is no road user that UN R157's driver would brake for",
+    ),
+    ("r04_circulating_truck_creeps_in", "it left room to brake gently, so it had given way (article 1)"),
+];
+
+type Label = BTreeMap<String, String>;
+
+#[test]
+fn situations_are_judged_as_their_analysts_signed() {
+    let folder = root().join("tests/cases/situations");
+    let mut wrong = Vec::new();
+    let mut played = 0;
+    for part in ["first", "second"] {
+        let tables: Vec<BTreeMap<String, Label>> = labels(&folder.join(part));
+        for path in blind(&folder.join(part)) {
+            played += 1;
+            let case = path.file_stem().expect("it has a name").to_string_lossy().into_owned();
+            let said = play(&path);
+            let of = tables.iter().map(|table| disagreements(&table[&case], &said));
+            let found: Vec<Vec<String>> = of.collect();
+            let agrees = found.iter().any(Vec::is_empty);
+            let is_argued = ARGUED.iter().any(|(name, _)| *name == case);
+            if agrees == is_argued {
+                wrong.push(format!("{part}/{case}: {found:?}"));
+            }
+        }
+    }
+    assert!(played >= 110, "{played} situations");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// The situations of a folder that the blind driver plays.
+fn blind(folder: &Path) -> Vec<PathBuf> {
+    let entries =
+        std::fs::read_dir(folder).expect("it is there").map(|entry| entry.expect("it is there").path());
+    let is_one = |path: &PathBuf| {
+        path.extension().is_some_and(|extension| extension == "ava")
+            && std::fs::read_to_string(path).expect("it is text").contains("\n// ADS: blind\n")
+    };
+    let mut all: Vec<PathBuf> = entries.filter(is_one).collect();
+    all.sort();
+    all
+}
+
+/// The tables of labels of a folder, each by case.
+fn labels(folder: &Path) -> Vec<BTreeMap<String, Label>> {
+    let names = ["labels.csv", "labels-a.csv", "labels-b.csv"];
+    let texts = names.iter().filter_map(|name| std::fs::read_to_string(folder.join(name)).ok());
+    texts
+        .map(|text| {
+            let mut lines = text.lines();
+            let head: Vec<&str> = lines.next().expect("it has a head").split(',').collect();
+            let row = |line: &str| {
+                let cells = split(line);
+                let label: Label = head.iter().map(|name| (*name).to_owned()).zip(cells).collect();
+                (label["case"].clone(), label)
+            };
+            lines.map(row).collect()
+        })
+        .collect()
+}
+
+/// The cells of a line; a quoted one may hold commas.
+fn split(line: &str) -> Vec<String> {
+    let mut cells = vec![String::new()];
+    let mut is_quoted = false;
+    for letter in line.chars() {
+        match letter {
+            '"' => is_quoted = !is_quoted,
+            ',' if !is_quoted => cells.push(String::new()),
+            _ => cells.last_mut().expect("there is one").push(letter),
+        }
+    }
+    cells
+}
+
+/// What was said of a situation: of each contact by the labels' names, and the requirements that were breached.
+struct Said {
+    contacts: Vec<Label>,
+    breaches: BTreeSet<String>,
+}
+
+fn play(path: &Path) -> Said {
+    let out = tempfile::tempdir().expect("there is room");
+    let run = out.path().join("run");
+    let mut command = assert_cmd::Command::cargo_bin("avastra").expect("it was built");
+    command.arg("run").arg(path).args([
+        "--agent",
+        "every-row",
+        "--ads",
+        "blind",
+        "--jobs",
+        "1",
+        "--replays",
+        "0",
+    ]);
+    command.arg("--out").arg(&run).output().expect("it runs");
+    let database = Connection::open_with_flags(run.join("run.db"), OpenFlags::SQLITE_OPEN_READ_ONLY)
+        .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let names = "avoidability, priority, struck, sudden, precrash_number, harm";
+    let query = format!("SELECT {names} FROM collision ORDER BY episode, number");
+    let mut statement = database.prepare(&query).expect("the columns are there");
+    let yes = |is: bool| if is { "yes" } else { "no" }.to_owned();
+    let contacts = statement.query_map([], |row| {
+        let avoidability: String = row.get(0)?;
+        let number: Option<i64> = row.get(4)?;
+        Ok(Label::from([
+            ("avoid".to_owned(), yes(avoidability == "avoidable")),
+            ("prio".to_owned(), row.get(1)?),
+            ("struck".to_owned(), yes(row.get(2)?)),
+            ("sudden".to_owned(), yes(row.get(3)?)),
+            ("kind".to_owned(), number.map_or(String::new(), |number| number.to_string())),
+            ("harm".to_owned(), row.get(5)?),
+        ]))
+    });
+    let contacts = contacts.expect("it can be read").map(|row| row.expect("it can be read")).collect();
+    let mut statement = database.prepare("SELECT requirement FROM breach").expect("the table is there");
+    let breaches = statement.query_map([], |row| row.get(0)).expect("it can be read");
+    Said { contacts, breaches: breaches.map(|name| name.expect("it can be read")).collect() }
+}
+
+/// The fields of a label that are said otherwise.
+fn disagreements(label: &Label, said: &Said) -> Vec<String> {
+    let told = |name: &str| label.get(name).map(String::as_str).filter(|value| !value.is_empty());
+    let nth: usize = told("n").map_or(1, |number| number.parse().expect("it is a number"));
+    let contact = said.contacts.get(nth - 1);
+    let mut found = Vec::new();
+    if let Some(value) = told("breach") {
+        let known = said.breaches.iter().filter(|name| !NEWER.contains(&name.as_str()));
+        let is_right = match value {
+            "none" => known.count() == 0,
+            names => names.split([',', ';']).all(|name| said.breaches.contains(name)),
+        };
+        if !is_right {
+            found.push(format!("breach: labelled {value}, found {:?}", said.breaches));
+        }
+    }
+    if told("hit") == Some("no") {
+        if contact.is_some() {
+            found.push("a contact".to_owned());
+        }
+        return found;
+    }
+    for name in ["avoid", "prio", "struck", "sudden", "kind", "harm"] {
+        let Some(value) = told(name) else { continue };
+        let is = contact.map_or("no contact", |contact| contact[name].as_str());
+        if !value.split('|').any(|one| one == is) {
+            found.push(format!("{name}: labelled {value}, found {is}"));
+        }
+    }
+    found
+}
