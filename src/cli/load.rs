@@ -511,6 +511,9 @@ fn read_up_to(path: &Path, bytes_max: u64) -> Result<String, ReadError> {
     if bytes.len() as u64 > bytes_max {
         return Err(ReadError(format!("it is larger than {} MiB", bytes_max >> 20)));
     }
+    if path.extension().is_some_and(|extension| extension == "xodr" || extension == "xosc") {
+        return avastra_road::xml_text(bytes).map_err(ReadError);
+    }
     String::from_utf8(bytes).map_err(|error| {
         ReadError(format!("not text: byte {} is not UTF-8", error.utf8_error().valid_up_to()))
     })

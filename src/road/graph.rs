@@ -16,13 +16,16 @@ use super::map::{
     Junction, Lane, LaneIndex, LaneKey, LeftOut, Neighbour, Precedence, RoadError, RoadMap, Strip, Turn,
 };
 use super::opendrive::{
-    Contact, Document, JunctionElement, LaneElement, RoadElement, RoadLink, SectionElement, wrong,
+    Contact, Document, JunctionElement, LaneElement, Limit, RoadElement, RoadLink, SectionElement, wrong,
 };
 use super::phases::share_phases;
-use super::signals::{add_objects, add_signals, set_precedence};
+use super::signals::{add_objects, add_signals, find_obstacles, set_precedence};
 
 /// The limit of a road whose file states none, m/s: 50 km/h, usual in towns.
 pub const LIMIT_MPS_DEFAULT: f64 = 50.0 / 3.6;
+
+/// The limit of a motorway without one, m/s: 130 km/h, which Germany advises.
+const ADVISED_MPS: f64 = 130.0 / 3.6;
 
 /// Below this change of heading a connection is straight (survey conventions).
 const STRAIGHT_RAD_MAX: f64 = 30.0 * core::f64::consts::PI / 180.0;
@@ -64,6 +67,7 @@ pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
     builder.link_sections();
     builder.link_roads();
     builder.link_junctions();
+    builder.warn_of_unlinked_roads();
     builder.unlink_corners();
     builder.set_neighbours();
     add_signals(&mut builder)?;
@@ -96,6 +100,7 @@ pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
     share_phases(&mut map);
     set_precedence(document, &mut map);
     map.grid = LaneGrid::new(&map.lanes);
+    find_obstacles(document, &mut map);
     Ok(map)
 }
 
@@ -224,7 +229,8 @@ impl<'a> Builder<'a> {
 
     fn add_lanes(&mut self) -> Result<(), RoadError> {
         let document = self.document;
-        let mut limitless = 0;
+        // Lanes without a limit: motorways that have none, others that have none, and lanes of which none is stated.
+        let (mut free, mut without, mut limitless) = (0, 0, 0);
         let mut tight: Vec<String> = Vec::new();
         // Lanes and vertices inside each junction.
         let mut inside = vec![(0, 0); document.junctions.len()];
@@ -282,16 +288,20 @@ impl<'a> Builder<'a> {
                             return Err(crowded(&document.junctions[junction]));
                         }
                     }
-                    let limit_mps = speed_limit_mps(road, section, element.id);
-                    let states_limit = limit_mps.is_some();
-                    limitless += usize::from(!states_limit);
+                    let (limit_mps, kind) = match element.limit {
+                        Limit::Of(limit_mps) => (limit_mps, None),
+                        Limit::No if element.is_motorway => (ADVISED_MPS, Some(&mut free)),
+                        Limit::No => (LIMIT_MPS_DEFAULT, Some(&mut without)),
+                        Limit::Unstated => (LIMIT_MPS_DEFAULT, Some(&mut limitless)),
+                    };
+                    let states_limit = kind.is_none();
+                    kind.into_iter().for_each(|count: &mut usize| *count += 1);
                     let key = LaneKey { road: road.id.clone(), section: section_index, lane: element.id };
                     let index = LaneIndex(self.map.lanes.len());
                     self.lanes.insert((road_index, section_index, element.id), index);
-                    let limit_mps = limit_mps.unwrap_or(LIMIT_MPS_DEFAULT);
                     let mut lane = new_lane(key, centre, limit_mps, road.left_hand, junction);
                     lane.states_limit = states_limit;
-                    lane.is_motorway = road.is_motorway;
+                    lane.is_motorway = element.is_motorway;
                     lane.for_buses = element.for_buses;
                     lane.heights = Heights::sampled(lane.centre.length_m(), |station_m| {
                         road.elevation.at(lane.road_station_m(station_m)).value
@@ -311,8 +321,15 @@ impl<'a> Builder<'a> {
                 .warnings
                 .push(format!("left out {number} lanes that turn round {message}; the first is {first}"));
         }
-        if limitless > 0 {
-            self.map.warnings.push(format!("{limitless} lanes state no speed limit; 50 km/h is taken"));
+        for (count, words) in [
+            (limitless, "lanes state no speed limit; 50 km/h is taken"),
+            (without, "lanes off motorways state that they have no speed limit; 50 km/h is taken"),
+            (
+                free,
+                "lanes of motorways state that they have no speed limit; 130 km/h is taken, which Germany advises",
+            ),
+        ] {
+            self.map.warnings.extend((count > 0).then(|| format!("{count} {words}")));
         }
         Ok(())
     }
@@ -392,6 +409,44 @@ impl<'a> Builder<'a> {
                 }
             }
         }
+    }
+
+    /// Warns of roads that lead into each other while none of their lanes does.
+    fn warn_of_unlinked_roads(&mut self) {
+        let document = self.document;
+        for (road_index, road) in document.roads.iter().enumerate() {
+            for (contact, link) in [(Contact::Start, &road.predecessor), (Contact::End, &road.successor)] {
+                let Some(RoadLink::Road { id, contact: other_contact, line }) = link else { continue };
+                let Some(other) = self.roads.get(id.as_str()).copied() else { continue };
+                let goes_on = |(lane, leaves): &(LaneIndex, bool)| {
+                    let lane = self.map.lane(*lane);
+                    !(if *leaves { &lane.successors } else { &lane.predecessors }).is_empty()
+                };
+                // Lanes that come to the end need some that go on from there.
+                let (here, there) =
+                    (self.driven_at(road_index, contact), self.driven_at(other, *other_contact));
+                // Lanes that come to the end need some that go on from there.
+                let could = here.iter().any(|(_, leaves)| there.iter().any(|(_, other)| other != leaves));
+                if could && !here.iter().any(goes_on) {
+                    let message = format!(
+                        "road `{}` leads to road `{id}`, but no lane says to which lane: nobody drives on there",
+                        road.id
+                    );
+                    self.map.warnings.push(format!("line {line}: {message}"));
+                }
+            }
+        }
+    }
+
+    /// The driving lanes at an end of a road, and whether their traffic leaves the road there.
+    fn driven_at(&self, road_index: usize, contact: Contact) -> Vec<(LaneIndex, bool)> {
+        let road = &self.document.roads[road_index];
+        let section = end_section(road, contact);
+        let driven = road.sections[section].lanes.iter().filter_map(|lane| {
+            let leaves = road.runs_along(lane.id) == (contact == Contact::End);
+            Some((self.lane_index(road_index, section, lane.id)?, leaves))
+        });
+        driven.collect()
     }
 
     fn warn_broken_link(&mut self, road: &RoadElement, missing: &str, line: u32) {
@@ -677,21 +732,6 @@ fn crowded(junction: &JunctionElement) -> RoadError {
         junction.id
     );
     wrong(junction.line, message)
-}
-
-/// The lowest speed limit on a lane of a section; a limit of the lane itself goes before the road's.
-fn speed_limit_mps(road: &RoadElement, section: &SectionElement, lane: i32) -> Option<f64> {
-    let own = &section.lane(lane)?.speeds;
-    lowest_limit(own, 0.0, section.end_m - section.begin_m)
-        .or_else(|| lowest_limit(&road.speeds, section.begin_m, section.end_m))
-}
-
-/// The lowest limit between two stations; each of the records, by rising station, holds until the next.
-fn lowest_limit(records: &[(f64, Option<f64>)], from_m: f64, to_m: f64) -> Option<f64> {
-    let begun = records.partition_point(|(begin_m, _)| *begin_m <= from_m);
-    let ended = records.partition_point(|(begin_m, _)| *begin_m < to_m);
-    let holding = records.get(begun.saturating_sub(1)..ended)?;
-    holding.iter().filter_map(|(_, limit)| *limit).min_by(f64::total_cmp)
 }
 
 /// Width of the gap between two lanes, measured in the middle of a section, m.

@@ -39,9 +39,9 @@ pub use graph::LIMIT_MPS_DEFAULT;
 pub use heights::{Heights, is_apart};
 pub use lane_change::STRIP_M_MAX;
 pub use map::{
-    Crosswalk, Junction, Lane, LaneIndex, LaneKey, LanePlace, LeftOut, Neighbour, Precedence, RoadError,
-    RoadMap, Side, Sign, SignKind, SignLine, Signal, Solid, StopLine, Strip, StripKind, Turn,
+    Crosswalk, Junction, Lane, LaneIndex, LaneKey, LanePlace, LeftOut, Neighbour, Obstacle, Precedence,
+    RoadError, RoadMap, Side, Sign, SignKind, SignLine, Signal, Solid, StopLine, Strip, StripKind, Turn,
 };
-pub use opendrive::{Lines, well_formed};
+pub use opendrive::{Lines, well_formed, xml_text};
 pub use proposal::{Proposal, propose};
-pub use route::{Conflict, Route, RouteLane, RouteLaneChange};
+pub use route::{Conflict, LEVEL_SLOPE_MAX, Route, RouteLane, RouteLaneChange};

@@ -205,6 +205,15 @@ pub struct Strip {
     pub bounds: Bounds,
 }
 
+/// A solid thing of the map that stands in a lane.
+#[derive(Debug, Clone)]
+pub struct Obstacle {
+    /// For example ``obstacle `7` ``.
+    pub what: String,
+    /// A lane that it stands in, and where: one that stands in several is there for each.
+    pub place: LanePlace,
+}
+
 /// A building, a wall, a tree: something through which nobody walks.
 #[derive(Debug, Clone)]
 pub struct Solid {
@@ -235,6 +244,8 @@ pub struct RoadMap {
     pub crosswalks: Vec<Crosswalk>,
     pub strips: Vec<Strip>,
     pub solids: Vec<Solid>,
+    /// Solid things that stand in lanes, where whatever drives passes through them.
+    pub obstacles: Vec<Obstacle>,
     /// Whether roads may pass over each other. If not, no heights need to be compared.
     pub has_levels: bool,
     /// What was repaired, left out or not understood.

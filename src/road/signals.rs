@@ -6,13 +6,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use avastra_base::geometry::{Bounds, Pose, Vec2};
 
 use super::graph::Builder;
+use super::heights::is_apart;
 use super::map::{
-    Crosswalk, Lane, LaneIndex, Precedence, RoadError, RoadMap, Sign, SignKind, SignLine, Signal, Solid,
-    StopLine,
+    Crosswalk, Lane, LaneIndex, LanePlace, Obstacle, Precedence, RoadError, RoadMap, Sign, SignKind,
+    SignLine, Signal, Solid, StopLine,
 };
 use super::opendrive::{
-    ControllerElement, Document, JunctionElement, Meaning, ObjectKind, Orientation, Outline, RoadElement,
-    RoadLink, SignalElement, wrong,
+    ControllerElement, Document, JunctionElement, Meaning, ObjectElement, ObjectKind, Orientation, Outline,
+    RoadElement, RoadLink, SignalElement, wrong,
 };
 
 /// Signal heads of one group that are nearer to each other than this share a stop line, m.
@@ -405,14 +406,7 @@ fn recorded(records: &[Records], map: &RoadMap, index: LaneIndex) -> Precedence 
 pub fn add_objects(builder: &mut Builder) {
     for road in &builder.document.roads {
         for object in &road.objects {
-            let outline: Vec<Vec2> = match &object.outline {
-                Outline::Local(corners) => {
-                    let heading_rad = road.reference.at(object.s_m).heading_rad + object.heading_rad;
-                    let pose = Pose { position: position(road, object.s_m, object.t_m), heading_rad };
-                    corners.iter().map(|(u, v)| pose.to_world(Vec2::new(*u, *v))).collect()
-                }
-                Outline::Road(corners) => corners.iter().map(|(s, t)| position(road, *s, *t)).collect(),
-            };
+            let outline = outline(road, object);
             match object.kind {
                 ObjectKind::Crosswalk => {
                     let (id, height_m) = (object.id.clone(), road.elevation.at(object.s_m).value);
@@ -424,6 +418,76 @@ pub fn add_objects(builder: &mut Builder) {
                 }
             }
         }
+    }
+}
+
+/// The corners of an object in the plane.
+fn outline(road: &RoadElement, object: &ObjectElement) -> Vec<Vec2> {
+    match &object.outline {
+        Outline::Local(corners) => {
+            let heading_rad = road.reference.at(object.s_m).heading_rad + object.heading_rad;
+            let pose = Pose { position: position(road, object.s_m, object.t_m), heading_rad };
+            corners.iter().map(|(u, v)| pose.to_world(Vec2::new(*u, *v))).collect()
+        }
+        Outline::Road(corners) => corners.iter().map(|(s, t)| position(road, *s, *t)).collect(),
+    }
+}
+
+/// Something solid that reaches farther into a lane than this stands in it, m. Walls and barriers stand at edges.
+const REACHES_M: f64 = 0.3;
+
+/// The outlines of solid things are looked at in such steps, m, and in at most so many of one edge and of a map.
+const OUTLINE_STEP_M: f64 = 1.0;
+const EDGE_STEPS_MAX: f64 = 100.0;
+const OUTLINE_STEPS_MAX: usize = 200_000;
+
+/// Finds the solid things that stand in lanes, and warns of them: nothing that drives knows them.
+pub fn find_obstacles(document: &Document, map: &mut RoadMap) {
+    let (mut steps, mut count) = (0, 0);
+    for road in &document.roads {
+        let solid = |object: &&ObjectElement| object.kind == ObjectKind::Solid && object.is_on_the_ground;
+        for object in road.objects.iter().filter(solid) {
+            let height_m = road.elevation.at(object.s_m).value;
+            let corners = outline(road, object);
+            let edges = corners.iter().zip(corners.iter().cycle().skip(1));
+            let points = edges.flat_map(|(from, to)| {
+                let count = ((to - from).norm() / OUTLINE_STEP_M).ceil().clamp(1.0, EDGE_STEPS_MAX);
+                (0..count as u32).map(move |nth| from + (to - from) * (f64::from(nth) / count))
+            });
+            let mut places: BTreeMap<LaneIndex, LanePlace> = BTreeMap::new();
+            for point in points {
+                steps += 1;
+                if steps > OUTLINE_STEPS_MAX {
+                    break;
+                }
+                let Some(place) = map.nearest(point, 0.0, 0.0) else { continue };
+                let lane = map.lane(place.lane);
+                let is_deep = place.offset_m.abs() < lane.width_at(place.station_m) / 2.0 - REACHES_M;
+                if is_deep && !is_apart(lane.height_at(place.station_m), height_m) {
+                    places.entry(place.lane).or_insert(place);
+                }
+            }
+            count += usize::from(!places.is_empty());
+            map.obstacles.extend(places.into_values().map(|place| {
+                let what = format!("{} `{}`", object.word, object.id);
+                Obstacle { what, place }
+            }));
+        }
+    }
+    if let Some(Obstacle { what, place }) = map.obstacles.first() {
+        let lane = map.lane(place.lane);
+        let warning = format!(
+            "solid objects that stand in driving lanes: {count}; whatever drives passes through them; the first is {what} in lane {} of road `{}` at s {:.1}",
+            lane.key.lane,
+            lane.key.road,
+            lane.road_station_m(place.station_m)
+        );
+        map.warned_at.push((map.warnings.len(), lane.centre.position_at(place.station_m)));
+        map.warnings.push(warning);
+    }
+    if steps > OUTLINE_STEPS_MAX {
+        let warning = "so many solid objects stand beside the roads that not all were looked at: more may stand in driving lanes";
+        map.warnings.push(warning.to_owned());
     }
 }
 

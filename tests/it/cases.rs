@@ -67,7 +67,7 @@ pub fn cases(area: &str) -> Vec<(String, PathBuf)> {
     let folder = root().join("tests/cases").join(area);
     let found = match area {
         // What is imported is no file of ours; in its folders stand catalogues.
-        "imports" => files(&folder, "xosc"),
+        "imports" | "imported" => files(&folder, "xosc"),
         // Beside the folders stands what all situations use.
         "verdicts" => {
             entries(&folder).iter().filter(|path| path.is_dir()).flat_map(|path| files(path, "ava")).collect()

@@ -126,6 +126,84 @@ fn a_parameter_may_have_another_value() {
     assert_eq!(import("ego_kmh").0, 1);
 }
 
+/// Files of `tests/cases/imported`, each of which says in its comments what is right: who is where at a time (x, y and heading of
+/// the body's middle), what a note tells, or why the file is refused.
+#[test]
+fn every_file_comes_out_as_it_says() {
+    try_each("imported", |name, path| {
+        let text = std::fs::read_to_string(path).expect("it is there");
+        let comments = text.lines().filter_map(|line| line.strip_prefix("<!-- ")?.strip_suffix(" -->"));
+        let scratch = tempfile::tempdir().expect("a scratch directory");
+        let folder = scratch.path().display().to_string();
+        let file = path.display().to_string();
+        let (status, stdout, stderr) = outcome(&mut avastra(&["import", "--out", &folder, &file]));
+        let is_refused = comments.clone().any(|comment| comment.starts_with("refused: "));
+        assert_eq!(status, if is_refused { 2 } else { 0 }, "{stdout}{stderr}");
+        let rows = if is_refused { Vec::new() } else { rows(&folder, &name) };
+        for comment in comments {
+            if let Some(words) = comment.strip_prefix("refused: ").or_else(|| comment.strip_prefix("note: "))
+            {
+                assert!(stdout.contains(words), "{words}: {stdout}");
+            } else if let Some((who, (time_s, wanted))) = place_said(comment) {
+                let at = rows.iter().find(|(body, at_s, _)| *body == who && (at_s - time_s).abs() < 1e-6);
+                let (_, _, found) = at.unwrap_or_else(|| panic!("{name}: no {who} at {time_s} s"));
+                // Phases begin at ticks, and a move to the side ends within a few centimetres.
+                let is_there = found.iter().zip(wanted).all(|(found, wanted)| (found - wanted).abs() < 0.05);
+                assert!(is_there, "{comment}: {found:?}");
+            }
+        }
+    });
+}
+
+/// `T at 3 s: 161.4 -1.75 0`.
+fn place_said(comment: &str) -> Option<(&str, (f64, [f64; 3]))> {
+    let (head, numbers) = comment.split_once(" s: ")?;
+    let (who, time_s) = head.split_once(" at ")?;
+    let numbers: Vec<f64> = numbers.split(' ').filter_map(|number| number.parse().ok()).collect();
+    Some((who, (time_s.parse().ok()?, numbers.try_into().ok()?)))
+}
+
+/// Who is where, and when, in the scenario of an imported file.
+fn rows(folder: &str, name: &str) -> Vec<(String, f64, [f64; 3])> {
+    done(&["export", "--to", "csv", "--out", folder, &format!("{folder}/{name}_scenario.ava")]);
+    let table = std::fs::read_to_string(format!("{folder}/{name}_scenario.csv")).expect("it was written");
+    let row = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let number = |at: usize| cells[at].parse::<f64>().expect("it is a number");
+        (cells[2].to_owned(), number(0), [number(3), number(4), number(5)])
+    };
+    table.lines().skip(1).map(row).collect()
+}
+
+/// Texts of other encodings say the same.
+#[test]
+fn files_of_other_encodings_are_read_or_refused_by_name() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let file = scratch.path().join("case.xosc").display().to_string();
+    let folder = scratch.path().join("imported").display().to_string();
+    std::fs::copy(root().join("tests/cases/imported/straight.xodr"), scratch.path().join("straight.xodr"))
+        .expect("it can be copied");
+    let text = read("tests/cases/imported/dollar_in_declared_names.xosc").replace("own", "gr\u{fc}n");
+    let declared = |encoding: &str| text.replace("UTF-8", encoding);
+    let wide = |unit: fn(u16) -> [u8; 2]| -> Vec<u8> {
+        core::iter::once(0xFEFF).chain(declared("UTF-16").encode_utf16()).flat_map(unit).collect()
+    };
+    let latin = |encoding| declared(encoding).chars().map(|one| one as u8).collect::<Vec<u8>>();
+    for (bytes, words) in [
+        (text.clone().into_bytes(), "case_scenario.ava"),
+        (wide(u16::to_le_bytes), "case_scenario.ava"),
+        (wide(u16::to_be_bytes), "case_scenario.ava"),
+        (latin("ISO-8859-1"), "case_scenario.ava"),
+        (latin("windows-1252"), "case_scenario.ava"),
+        (latin("KOI8-R"), "its encoding `koi8-r` is not read"),
+        (latin("UTF-8"), "not text: its encoding `utf-8` is not read, or it is another one"),
+    ] {
+        std::fs::write(&file, bytes).expect("it can be written");
+        let (_, stdout, stderr) = outcome(&mut avastra(&["import", "--out", &folder, &file]));
+        assert!(format!("{stdout}{stderr}").contains(words), "{words}: {stdout}{stderr}");
+    }
+}
+
 /// The map and the catalogue of the cases, from memory.
 struct Kept {
     map: String,
@@ -413,7 +491,7 @@ fn conditions_and_words_are_read_or_refused() {
         ("priority=\"overwrite\"", "priority=\"overwrite\" maximumExecutionCount=\"0\"", "never happens"),
         ("<LaneChangeAction>", "<LaneChangeAction targetLaneOffset=\"1.2\">", "offset: -2.32 m"),
         ("relativeDistanceType=\"longitudinal\"", "relativeDistanceType=\"lateral\"", "lateral distances"),
-        ("</Act>", "<StopTrigger><ConditionGroup/></StopTrigger></Act>", "an act goes on"),
+        ("</Act>", "<StopTrigger><ConditionGroup/></StopTrigger></Act>", "it has no `Condition`"),
         (
             "delay=\"0\" conditionEdge=\"rising\"",
             "delay=\"-4\" conditionEdge=\"rising\"",

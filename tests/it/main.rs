@@ -19,6 +19,7 @@ mod exports;
 mod external;
 mod failures;
 mod faults;
+mod formats;
 mod help;
 mod hostile;
 mod imports;

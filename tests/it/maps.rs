@@ -17,6 +17,10 @@ use crate::world::space_at;
 const PLACES: [&str; 7] =
     ["dead_end", "left_hand", "motorway", "overpass", "parking", "priority", "roundabout"];
 
+/// Maps with something that readers of maps get wrong; their first line says what.
+const ODD: [&str; 7] =
+    ["limits_by_lane", "limits_by_type", "no_limit", "obstacle", "unlinked", "us_stop", "virtual_junction"];
+
 fn path(file: &str) -> String {
     format!("tests/cases/maps/{file}")
 }
@@ -34,10 +38,40 @@ fn lane(map: &RoadMap, road: &str, id: i32) -> LaneIndex {
 
 #[test]
 fn every_place_is_read_as_it_was_meant() {
-    for place in PLACES {
+    for place in PLACES.into_iter().chain(ODD) {
         let (status, stdout, stderr) = outcome(&mut avastra(&["road", &path(&format!("{place}.xodr"))]));
         assert_eq!((status, stderr.as_str()), (0, ""), "{place}");
         expect_snapshot("maps", place, &stdout);
+    }
+}
+
+/// What a map says by stations holds there: limits, motorways and lanes for buses, from both sides of a section.
+#[test]
+fn limits_and_access_hold_where_the_map_says() {
+    for file in ["limits_by_type", "limits_by_lane"] {
+        let map = map(file);
+        for (s_m, limit_kmh) in [(100.0, 100.0), (199.0, 100.0), (201.0, 30.0), (399.0, 30.0), (401.0, 100.0)]
+        {
+            let place = map.place("1", -1, s_m).expect("it is there");
+            assert!((map.lane(place.lane).speed_limit_mps * 3.6 - limit_kmh).abs() < 1e-9, "{file} at {s_m}");
+        }
+        let place = |s_m| map.place("1", -1, s_m).expect("it is there");
+        let route = Route::find(&map, place(10.0), place(590.0)).expect("there is a way");
+        assert!((route.goal_m - 580.0).abs() < 1e-6 && route.lanes.len() == 3, "{file}");
+    }
+    // Where nothing changes, nothing is cut.
+    let text = std::fs::read_to_string(root().join(path("limits_by_type.xodr"))).expect("it is there");
+    let even =
+        RoadMap::from_opendrive("even", &text.replace("max=\"30\"", "max=\"100\"")).expect("it is sound");
+    assert_eq!(even.lanes.len(), 1);
+    let text = std::fs::read_to_string(root().join(path("limits_by_lane.xodr"))).expect("it is there");
+    let before = "<speed sOffset=\"0\"";
+    let buses = "<access sOffset=\"0\" restriction=\"none\"/><access sOffset=\"300\" restriction=\"bus\"/>";
+    let map = RoadMap::from_opendrive("buses", &text.replacen(before, &format!("{buses}{before}"), 1));
+    let map = map.expect("it is sound");
+    for (s_m, for_buses) in [(100.0, false), (299.0, false), (301.0, true), (500.0, true)] {
+        let place = map.place("1", -1, s_m).expect("it is there");
+        assert_eq!(map.lane(place.lane).for_buses, for_buses, "at {s_m}");
     }
 }
 

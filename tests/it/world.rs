@@ -58,7 +58,9 @@ pub fn space(name: &str) -> Arc<Space> {
 /// A space by its path in the repository.
 pub fn space_at(name: &str) -> Arc<Space> {
     let loaded = avastra::check::load(&root().join(name), &read).expect("it is there");
-    assert!(loaded.diagnostics.is_empty(), "{name}: {:?}", loaded.diagnostics);
+    // A hill is driven as if it were level, which is what some tests are about.
+    let is_sound = loaded.diagnostics.iter().all(|found| found.code == "AV0114");
+    assert!(is_sound, "{name}: {:?}", loaded.diagnostics);
     loaded.space.expect("a space without mistakes is a space")
 }
 

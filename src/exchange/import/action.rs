@@ -36,6 +36,18 @@ pub enum ActKind {
     Route(Vec<Position>),
 }
 
+impl Act {
+    /// Whether it changes nothing where its goal is reached already.
+    pub fn is_the_same_again(&self) -> bool {
+        match &self.kind {
+            ActKind::Speed(Speed::Absolute(_), dynamics) => !dynamics.is_continuous,
+            ActKind::Lane(Target::Lane(_), ..) | ActKind::Offset(Aside::InLane(_), _) => true,
+            ActKind::Placed(_) | ActKind::Route(_) => true,
+            _ => false,
+        }
+    }
+}
+
 /// A place across the road.
 #[derive(Debug, Clone)]
 pub enum Aside {
@@ -146,6 +158,8 @@ pub struct Way {
     pub timing: Option<(f64, f64)>,
     /// Whether the times count from the beginning of the scenario.
     pub is_absolute: bool,
+    /// Whether who follows it steers along it, and so has headings of its own.
+    pub is_steered: bool,
 }
 
 /// Reads an action of somebody's within a `PrivateAction`; `None` if it does nothing that matters, or is refused.
@@ -164,6 +178,11 @@ pub fn act(source: &mut Source, action: Node, name: &str, is_ego: bool) -> Optio
         "SynchronizeAction" if !is_ego => meeting(source, action).map(|kind| Act { mark, kind }),
         "SynchronizeAction" => None,
         "ControllerAction" | "ActivateControllerAction" | "AssignControllerAction" => {
+            let overridden = action.descendants().filter(|node| node.has_attribute("active"));
+            for pedal in overridden.collect::<Vec<Node>>() {
+                let moves = !is_ego && source.switch(pedal, "active", false)?;
+                source.refuse_if(moves, pedal, "pedals and a wheel that move by themselves are not read")?;
+            }
             if !is_ego && drives(source, action)? && source.controlled.contains(name) {
                 return source.refuse(
                     action,
@@ -255,7 +274,7 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<ActKind> {
         "LaneChangeAction" => {
             let node = source.required(action, "LaneChangeActionDynamics")?;
             let dynamics = dynamics(source, node)?;
-            let offset_m = source.number_or(action, "targetLaneOffset", 0.0)?;
+            let offset_m = source.left_or_0(action, "targetLaneOffset")?;
             let target = source.required(action, "LaneChangeTarget")?;
             if let Some(absolute) = element(target, "AbsoluteTargetLane") {
                 let lane = Target::Lane(source.integer(absolute, "value")?);
@@ -286,11 +305,11 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<ActKind> {
             };
             let target = source.required(action, "LaneOffsetTarget")?;
             if let Some(absolute) = element(target, "AbsoluteTargetLaneOffset") {
-                return Some(ActKind::Offset(Aside::InLane(source.number(absolute, "value")?), dynamics));
+                return Some(ActKind::Offset(Aside::InLane(source.left(absolute, "value")?), dynamics));
             }
             let relative = source.required(target, "RelativeTargetLaneOffset")?;
             let of = source.text(relative, "entityRef")?;
-            Some(ActKind::Offset(Aside::Of(of, source.number(relative, "value")?), dynamics))
+            Some(ActKind::Offset(Aside::Of(of, source.left(relative, "value")?), dynamics))
         }
         "FollowTrajectoryAction" => way(source, action).map(|way| ActKind::Follow(Box::new(way))),
         "AssignRouteAction" => route(source, action).map(ActKind::Route),
@@ -403,9 +422,6 @@ fn within(source: &mut Source, bounds: Node) -> Option<Option<Bounds>> {
 
 fn meeting(source: &mut Source, action: Node) -> Option<ActKind> {
     let master = source.text(action, "masterEntityRef")?;
-    for name in ["targetTolerance", "targetToleranceMaster"] {
-        source.number_or(action, name, 0.0)?;
-    }
     let (at, own) =
         (source.required(action, "TargetPositionMaster")?, source.required(action, "TargetPosition")?);
     let (master_at, own_at) = (position(source, at)?, position(source, own)?);
@@ -434,9 +450,12 @@ fn meeting(source: &mut Source, action: Node) -> Option<ActKind> {
 
 fn way(source: &mut Source, action: Node) -> Option<Way> {
     let from_m = source.number_or(action, "initialDistanceOffset", 0.0)?;
-    if let Some(mode) = element(action, "TrajectoryFollowingMode")
-        && source.word(mode, "followingMode", &FOLLOWING)? == "follow"
-    {
+    let mode = match element(action, "TrajectoryFollowingMode") {
+        Some(mode) => source.word(mode, "followingMode", &FOLLOWING)?,
+        None => "",
+    };
+    let is_steered = mode == "follow";
+    if is_steered {
         source.note("who is to steer along a trajectory is on it exactly");
     }
     let outer = element(action, "TrajectoryRef").unwrap_or(action);
@@ -454,5 +473,5 @@ fn way(source: &mut Source, action: Node) -> Option<Way> {
         }
         found = Some((more_s, times));
     }
-    Some(Way { shape, from_m, timing: found, is_absolute })
+    Some(Way { shape, from_m, timing: found, is_absolute, is_steered })
 }

@@ -10,7 +10,7 @@ use roxmltree::Node;
 use super::Files;
 use super::body::Body;
 use super::ground::{Ground, Known, once};
-use super::source::{Source, children, element, elements, filled};
+use super::source::{Source, children, element, elements, filled, plain};
 use super::vocabulary;
 
 /// Where the catalogues of a kind are named, and what their entries are called.
@@ -34,6 +34,8 @@ struct Entry {
     text: Rc<str>,
     /// What is wrong with it; empty if nothing is.
     reason: String,
+    /// What it says that is not read.
+    noted: Vec<String>,
     /// What its catalogue calls itself, if only its file has the name that was asked for.
     other_name: Option<String>,
 }
@@ -126,13 +128,18 @@ fn entry_in(text: &str, kinds: &[Kind], catalogue: &str, name: &str, is_by_file:
     let list = list.filter(|node| is_by_file || is_named(node, catalogue))?;
     let is_of_kind = |node: &Node| kinds.iter().any(|Kind(_, element)| node.has_tag_name(*element));
     let found = children(list).find(|node| is_named(node, name) && is_of_kind(node))?;
-    let unknown = vocabulary::unknown(found);
+    let vocabulary::Found { unknown, noted } = vocabulary::looked_over(found);
     let reason = unknown
         .first()
         .map_or(String::new(), |(node, reason)| format!("`{}`: {reason}", node.tag_name().name()));
     let own = list.attribute("name").unwrap_or("");
     let other_name = (own != catalogue).then(|| own.to_owned());
-    Some(Entry { text: Rc::from(&text[found.range()]), reason, other_name })
+    Some(Entry {
+        text: Rc::from(&text[found.range()]),
+        reason,
+        noted: noted.into_iter().collect(),
+        other_name,
+    })
 }
 
 /// Notes the folders of catalogues.
@@ -174,7 +181,6 @@ pub fn body(
 fn assigned(source: &mut Source, reference: Node) -> Option<BTreeMap<String, String>> {
     let mut assigned = BTreeMap::new();
     for one in elements(reference, "ParameterAssignments").flat_map(children) {
-        // Some files write a `$` before the name.
         let name = source.named(one, "parameterRef")?;
         assigned.insert(name, source.text(one, "value")?);
     }
@@ -202,7 +208,8 @@ pub fn entry<T>(
         }
     }
     let whose = format!("`{name}` of `{catalogue}`");
-    let Some(Entry { text, reason, other_name }) = source.library.entry(&folders, kinds, &catalogue, &name)
+    let Some(Entry { text, reason, noted, other_name }) =
+        source.library.entry(&folders, kinds, &catalogue, &name)
     else {
         let kinds: Vec<String> = kinds.iter().map(|Kind(_, element)| format!("`{element}`")).collect();
         let mut reason = format!("no {} `{name}` in a catalogue `{catalogue}`", kinds.join(" or "));
@@ -217,6 +224,7 @@ pub fn entry<T>(
             "the catalogue `{catalogue}` calls itself `{own}`: it is found by the name of its file"
         ));
     }
+    noted.into_iter().for_each(|note| source.note(note));
     let document = avastra_road::well_formed(&text).ok().filter(|_| reason.is_empty());
     let Some(document) = document else { return source.refuse(reference, format!("{whose}: {reason}")) };
     let found = document.root_element();
@@ -231,13 +239,15 @@ pub fn entry<T>(
 fn given(entry: Node, assigned: BTreeMap<String, String>) -> Result<BTreeMap<String, String>, String> {
     let declared: Vec<Node> = elements(entry, "ParameterDeclarations").flat_map(children).collect();
     let is_declared =
-        |name: &&String| declared.iter().any(|one| one.attribute("name") == Some(name.as_str()));
+        |name: &&String| declared.iter().any(|one| one.attribute("name").map(plain) == Some(name.as_str()));
     if let Some(name) = assigned.keys().find(|name| !is_declared(name)) {
         return Err(format!("it declares no parameter `{name}`"));
     }
     let mut parameters = assigned;
     for one in declared {
-        let (Some(name), Some(value)) = (one.attribute("name"), one.attribute("value")) else { continue };
+        let (Some(name), Some(value)) = (one.attribute("name").map(plain), one.attribute("value")) else {
+            continue;
+        };
         if !parameters.contains_key(name) {
             let value = filled(value, &parameters)?;
             parameters.insert(name.to_owned(), value);

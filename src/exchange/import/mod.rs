@@ -240,11 +240,12 @@ impl Whole<'_> {
         let mut source = Source::new(Rc::clone(lines), asked, library);
         // What is told of values that the file excludes is dropped, so it is told again of others.
         if !self.is_known {
-            let unknown = vocabulary::unknown(document.root_element());
-            self.is_known = unknown.is_empty();
-            for (node, reason) in unknown {
+            let found = vocabulary::looked_over(document.root_element());
+            self.is_known = found.unknown.is_empty();
+            for (node, reason) in found.unknown {
                 source.refuse::<()>(node, reason);
             }
+            found.noted.into_iter().for_each(|note| source.note(note));
         }
         let story = story::read(&mut source, document, self.ego);
         let story = story.filter(|_| !source.is_excluded);
@@ -285,7 +286,9 @@ fn declared(document: &Document) -> Values {
     let lists = source::elements(document.root_element(), "ParameterDeclarations");
     let declared = lists.flat_map(source::children);
     declared
-        .filter_map(|one| Some((one.attribute("name")?.to_owned(), one.attribute("value")?.to_owned())))
+        .filter_map(|one| {
+            Some((source::plain(one.attribute("name")?).to_owned(), one.attribute("value")?.to_owned()))
+        })
         .collect()
 }
 

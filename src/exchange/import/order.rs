@@ -53,7 +53,55 @@ impl<'a> Cast<'a> {
         for pair in sequence.events.windows(2) {
             sequence.keeps_order(source, moving, &pair[0], &pair[1])?;
         }
+        for (nth, (event, times)) in sequence.events.iter().enumerate() {
+            self.is_stopped_by_nothing(source, moving, &sequence, (event, times))?;
+            let like = |kind: fn(&Act) -> bool| event.acts.iter().any(kind);
+            let (told_speed, told_aside) = (like(is_speed), like(is_aside));
+            let is_like = |act: &Act| told_speed && is_speed(act) || told_aside && is_aside(act);
+            let mut later = sequence.events[nth + 1..].iter().flat_map(|(event, _)| &event.acts);
+            let reason = "it may happen again after what comes later: `maximumExecutionCount=\"1\"` is read";
+            source.refuse_if(event.comes_again && later.any(is_like), &event.mark, reason)?;
+        }
         Some(sequence)
+    }
+
+    /// Refuses an event that the stop trigger of its act may cut short or keep from coming.
+    fn is_stopped_by_nothing(
+        &self,
+        source: &mut Source,
+        moving: &Moving<'a>,
+        sequence: &Sequence,
+        (event, times): (&Event, &Times),
+    ) -> Option<()> {
+        let Some((mark, stop)) = event.stop.as_deref() else { return Some(()) };
+        let is_time = stop.iter().flatten().all(|one| matches!(one.kind, When::Always | When::After(_)));
+        let waiting = Waiting::at_first(self, moving);
+        let stop_s = waiting.comes_s(source, stop, &|when| sequence.time_s(when));
+        let comes_s = times.comes_s.filter(|comes_s| comes_s.is_finite());
+        match (stop_s, times.ends_s.or(comes_s)) {
+            (Some(stop_s), _) if stop_s >= self.story.duration_s => return Some(()),
+            (Some(stop_s), Some(known_s)) if known_s > stop_s => {
+                let reason = format!(
+                    "as they begin, it stops its act at {stop_s:.1} s, before what `{}` does then has ended: what stops nothing is read",
+                    event.name()
+                );
+                return source.refuse(mark, reason);
+            }
+            (Some(stop_s), _) if times.ends_s.is_some_and(|ends_s| ends_s <= stop_s) && is_time => {
+                return Some(());
+            }
+            _ => {}
+        }
+        let reason = format!(
+            "whether what `{}` does has ended when it stops its act is not known: what stops nothing is read",
+            event.name()
+        );
+        source.refuse_if(is_time, mark, reason)?;
+        // The driving system may bring about another order.
+        source.note(
+            "an act that stops with what happens, and not at a time, is taken to stop after all that it does",
+        );
+        Some(())
     }
 
     /// When these events come, as far as that is known.

@@ -10,9 +10,9 @@ use super::order::{Sequence, is_aside, is_speed};
 use super::pace::{self, PACE, too_fast};
 use super::said::Said;
 use super::scene::{Cast, Moving};
-use super::source::Source;
+use super::source::{Mark, Source};
 use super::story::Event;
-use super::trigger::{Condition, Edge};
+use super::trigger::{Condition, Edge, When};
 use super::ways::Leg;
 
 /// A distance that is to be reached is, this near to it, m, as for esmini.
@@ -23,6 +23,11 @@ pub const ARRIVES_M: f64 = 0.05;
 
 const TIMES_LATER: &str =
     "it moves, and its trajectory has times only from later on: where it is until then is not known";
+
+/// Times that differ by less are the same, s: a tick.
+const TICK_S: f64 = 0.05;
+
+const TIMES_OF_NO_BEGINNING: &str = "its times count from the beginning of the scenario, and when it begins is not known: `relative` ones are read";
 
 const BESIDE_TIMES: &str =
     "beside the times of a trajectory or of a profile only what waits for their end is read";
@@ -53,6 +58,8 @@ struct Script<'c, 'a, 'e> {
     phases: Vec<Said>,
     /// What the last phases do, if it takes a while: what may follow.
     takes: Option<Takes>,
+    /// When that ends, s, if its times say so.
+    ends_s: Option<f64>,
 }
 
 impl<'c, 'a, 'e> Script<'c, 'a, 'e> {
@@ -66,7 +73,7 @@ impl<'c, 'a, 'e> Script<'c, 'a, 'e> {
             lane_m: lane.map_or(0.0, |lane| cast.aside_m(moving, moving.at_m, lane)),
             then: None,
         };
-        Script { cast, moving, sequence, told, phases: Vec::new(), takes: None }
+        Script { cast, moving, sequence, told, phases: Vec::new(), takes: None, ends_s: None }
     }
 
     /// The times of the trajectory on which it begins.
@@ -75,9 +82,7 @@ impl<'c, 'a, 'e> Script<'c, 'a, 'e> {
         let Some(way) = &moving.entity.way else { return Some(()) };
         let leg = moving.leg(way)?;
         if way.timing.is_some() {
-            let (timed, then) = cast.timed(source, moving, &leg.timed, Said::default(), true)?;
-            let waits = leg.timed.first().is_some_and(|(_, first_s)| *first_s > 0.0) && moving.mps > 0.0;
-            source.refuse_if(waits, &moving.entity.mark, TIMES_LATER)?;
+            let (timed, then) = self.timed(source, &way.shape.mark, leg, Said::default(), Some(0.0), true)?;
             self.phases.extend(timed);
             self.takes = Some(Takes { then: vec![then], is_cut_short: false });
         }
@@ -129,6 +134,8 @@ impl<'c, 'a, 'e> Script<'c, 'a, 'e> {
             None => Vec::new(),
         };
         go_together(source, acts, &self.told)?;
+        let begins_s = event.map_or(Some(0.0), |event| event.time_s().or_else(|| self.after_s(event)));
+        self.ends_s = None;
         let mut timed = Vec::new();
         let mut takes: Option<Takes> = None;
         for act in acts {
@@ -141,7 +148,7 @@ impl<'c, 'a, 'e> Script<'c, 'a, 'e> {
                     self.told.then = Some(near.and(" { speed: npc.speed }"));
                 }
                 ActKind::Follow(way) => {
-                    let then = self.follow(source, act, way, &begins, &mut timed)?;
+                    let then = self.follow(source, act, way, (&begins, begins_s), &mut timed)?;
                     Takes::add(&mut takes, then, way.timing.is_none());
                 }
                 ActKind::Profile(entries) => {
@@ -194,7 +201,7 @@ impl<'c, 'a, 'e> Script<'c, 'a, 'e> {
         source: &mut Source,
         act: &Act,
         way: &Way,
-        begins: &Said,
+        (begins, begins_s): (&Said, Option<f64>),
         timed: &mut Vec<Said>,
     ) -> Option<Said> {
         let (cast, moving) = (self.cast, self.moving);
@@ -207,16 +214,89 @@ impl<'c, 'a, 'e> Script<'c, 'a, 'e> {
         source.refuse_if(stands, &act.mark, reason)?;
         let then = if way.timing.is_some() {
             let then;
-            (*timed, then) = cast.timed(source, moving, &leg.timed, begins.clone(), way.is_absolute)?;
-            let first_s = leg.timed.first().map_or(0.0, |(_, first_s)| *first_s);
-            let waits = !way.is_absolute && first_s > 0.0 && self.told.mps != Some(0.0);
-            source.refuse_if(waits, &act.mark, TIMES_LATER)?;
+            (*timed, then) =
+                self.timed(source, &way.shape.mark, leg, begins.clone(), begins_s, way.is_absolute)?;
             then
         } else {
             arrives(leg.end_m)
         };
         cast.told_at_the_end(moving, leg, &mut self.told);
         Some(then)
+    }
+
+    /// When an event comes that waits for the end of what has times, s.
+    fn after_s(&self, event: &Event) -> Option<f64> {
+        match event.when.as_slice() {
+            [all] => match all.as_slice() {
+                [Condition { kind: When::Ended { .. }, delay_s, .. }] => Some(self.ends_s? + delay_s),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// The phases of one that is at the places of a trajectory at its times, and the words before a phase that waits for the end.
+    /// `begins_s`: when the trajectory begins, if that is known.
+    fn timed(
+        &mut self,
+        source: &mut Source,
+        mark: &Mark,
+        leg: &Leg,
+        begins: Said,
+        begins_s: Option<f64>,
+        is_absolute: bool,
+    ) -> Option<(Vec<Said>, Said)> {
+        let (moving, places) = (self.moving, &leg.timed);
+        let mut phases = Vec::new();
+        let (Some((_, first_s)), Some((last_m, last_s))) = (places.first(), places.last()) else {
+            return Some((phases, Said::default()));
+        };
+        // How long it waits at its first place.
+        let wait_s = match begins_s {
+            _ if !is_absolute => *first_s,
+            Some(begins_s) => first_s - begins_s,
+            None => return source.refuse(mark, TIMES_OF_NO_BEGINNING),
+        };
+        let reason = format!(
+            "its times begin {:.2} s before it does: where on its way it begins is not read",
+            -wait_s
+        );
+        source.refuse_if(wait_s < -TICK_S, mark, reason)?;
+        source.refuse_if(wait_s > TICK_S && self.told.mps != Some(0.0), mark, TIMES_LATER)?;
+        let mut begins = begins;
+        if wait_s > 0.0 {
+            begins = match is_absolute {
+                true => Said::text("once elapsed >= ").number(*first_s, "s").and(" "),
+                false => begins.and("after ").number(*first_s, "s").and(" "),
+            };
+        }
+        let mut is_wait = false;
+        for pair in places.windows(2) {
+            let ((from_m, from_s), (to_m, to_s)) = (pair[0], pair[1]);
+            let (way_m, time_s) = (to_m - from_m, to_s - from_s);
+            let reason = "a later place of its trajectory has no later time";
+            source.refuse_if(time_s < 0.0 || time_s == 0.0 && way_m > 0.0, mark, reason)?;
+            if time_s == 0.0 {
+                continue;
+            }
+            let said = core::mem::take(&mut begins);
+            let said = match (phases.is_empty(), is_wait) {
+                (true, _) | (false, true) => said,
+                (false, false) => {
+                    Said::text("once npc.station >= ").number(from_m + moving.more_m(), "m").and(" ")
+                }
+            };
+            let mps = way_m / time_s;
+            source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), &moving.entity.mark, too_fast(mps))?;
+            phases.push(said.and("{ speed: ").number(mps, "m/s").and(" }"));
+            self.told.mps = Some(mps);
+            is_wait = way_m < 1e-6;
+            if is_wait {
+                begins = Said::text("after ").number(time_s, "s").and(" ");
+            }
+        }
+        self.ends_s = begins_s.map(|begins_s| if is_absolute { *last_s } else { begins_s + last_s });
+        Some((phases, if is_wait { begins } else { arrives(last_m + moving.more_m()) }))
     }
 }
 
@@ -259,51 +339,6 @@ impl<'a> Cast<'a> {
     fn told_at_the_end(&self, moving: &Moving<'a>, leg: &Leg, told: &mut Told) {
         (told.at_m, told.lane, told.offset_m) = (leg.end_m, leg.lane, 0.0);
         told.lane_m = leg.lane.map_or(0.0, |lane| self.aside_m(moving, told.at_m, lane));
-    }
-
-    /// The phases of one that is at places of its way at given times, and the words before a phase that waits for the end.
-    fn timed(
-        &self,
-        source: &mut Source,
-        moving: &Moving,
-        places: &[(f64, f64)],
-        begins: Said,
-        is_absolute: bool,
-    ) -> Option<(Vec<Said>, Said)> {
-        let mut phases = Vec::new();
-        let (Some((_, first_s)), Some((last_m, _))) = (places.first(), places.last()) else {
-            return Some((phases, Said::default()));
-        };
-        let mut begins = begins;
-        if *first_s > 0.0 {
-            begins = match is_absolute {
-                true => Said::text("once elapsed >= ").number(*first_s, "s").and(" "),
-                false => begins.and("after ").number(*first_s, "s").and(" "),
-            };
-        }
-        let mut is_wait = false;
-        for pair in places.windows(2) {
-            let ((from_m, from_s), (to_m, to_s)) = (pair[0], pair[1]);
-            let (way_m, time_s) = (to_m - from_m, to_s - from_s);
-            if time_s <= 0.0 {
-                continue;
-            }
-            let said = core::mem::take(&mut begins);
-            let said = match (phases.is_empty(), is_wait) {
-                (true, _) | (false, true) => said,
-                (false, false) => {
-                    Said::text("once npc.station >= ").number(from_m + moving.more_m(), "m").and(" ")
-                }
-            };
-            let mps = way_m / time_s;
-            source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), &moving.entity.mark, too_fast(mps))?;
-            phases.push(said.and("{ speed: ").number(mps, "m/s").and(" }"));
-            is_wait = way_m < 1e-6;
-            if is_wait {
-                begins = Said::text("after ").number(time_s, "s").and(" ");
-            }
-        }
-        Some((phases, if is_wait { begins } else { arrives(last_m + moving.more_m()) }))
     }
 
     /// The fields of an order that an action is.

@@ -97,7 +97,7 @@ impl<'a> Places<'a> {
 
     /// A position of the file.
     pub fn placed(&mut self, source: &mut Source, position: &Position) -> Option<Placed> {
-        let Position { mark, kind, heading } = position;
+        let Position { mark, kind, heading, .. } = position;
         let placed = match kind {
             PositionKind::Lane { road, lane, s_m, offset_m } => match self.map.place(road, *lane, *s_m) {
                 Ok(place) => self.on_lane(LanePlace { offset_m: self.left_m(place, *offset_m), ..place }),

@@ -11,6 +11,8 @@ pub struct Position {
     pub mark: Mark,
     pub kind: PositionKind,
     pub heading: Heading,
+    /// Whether the file says the heading, and not only the place.
+    pub states_heading: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -101,7 +103,7 @@ fn place_in(source: &mut Source, parent: Node) -> Option<Position> {
             road: source.text(place, "roadId")?,
             lane: source.integer(place, "laneId")?,
             s_m: source.number(place, "s")?,
-            offset_m: source.number_or(place, "offset", 0.0)?,
+            offset_m: source.left_or_0(place, "offset")?,
         },
         "RelativeLanePosition" => {
             let along = if place.has_attribute("ds") { "ds" } else { "dsLane" };
@@ -109,33 +111,32 @@ fn place_in(source: &mut Source, parent: Node) -> Option<Position> {
                 entity: source.text(place, "entityRef")?,
                 lanes: source.integer(place, "dLane")?,
                 ahead_m: source.number(place, along)?,
-                offset_m: source.number_or(place, "offset", 0.0)?,
+                offset_m: source.left_or_0(place, "offset")?,
             }
         }
         "RoadPosition" => PositionKind::Road {
             road: source.text(place, "roadId")?,
             s_m: source.number(place, "s")?,
-            t_m: source.number(place, "t")?,
+            t_m: source.left(place, "t")?,
         },
         "RelativeRoadPosition" => PositionKind::RelativeRoad {
             entity: source.text(place, "entityRef")?,
             ds_m: source.number(place, "ds")?,
-            dt_m: source.number(place, "dt")?,
+            dt_m: source.left(place, "dt")?,
         },
         "WorldPosition" => {
-            let turned_rad = source.number_or(place, "h", 0.0)?;
-            heading = Heading::Absolute(turned_rad);
-            PositionKind::World { x_m: source.number(place, "x")?, y_m: source.number(place, "y")? }
+            heading = Heading::Absolute(source.left_or_0(place, "h")?);
+            PositionKind::World { x_m: source.number(place, "x")?, y_m: source.left(place, "y")? }
         }
         "RelativeWorldPosition" => PositionKind::RelativeWorld {
             entity: source.text(place, "entityRef")?,
             dx_m: source.number(place, "dx")?,
-            dy_m: source.number(place, "dy")?,
+            dy_m: source.left(place, "dy")?,
         },
         "RelativeObjectPosition" => PositionKind::RelativeObject {
             entity: source.text(place, "entityRef")?,
             dx_m: source.number(place, "dx")?,
-            dy_m: source.number(place, "dy")?,
+            dy_m: source.left(place, "dy")?,
         },
         "RoutePosition" => on_route(source, place)?,
         "TrajectoryPosition" => {
@@ -143,12 +144,13 @@ fn place_in(source: &mut Source, parent: Node) -> Option<Position> {
             PositionKind::OnTrajectory {
                 trajectory: Box::new(shape_of(source, reference)?),
                 s_m: source.number(place, "s")?,
-                t_m: source.number_or(place, "t", 0.0)?,
+                t_m: source.left_or_0(place, "t")?,
             }
         }
         _ => return source.refuse(place, "such a position is not read"),
     };
-    Some(Position { mark, kind, heading })
+    let orientation = element(place, "Orientation").unwrap_or(place);
+    Some(Position { mark, kind, heading, states_heading: orientation.has_attribute("h") })
 }
 
 /// The places that a route leads through.
@@ -186,13 +188,13 @@ fn on_route(source: &mut Source, place: Node) -> Option<PositionKind> {
         "FromCurrentEntity" => Some(PositionKind::Entity(source.text(inner, "entityRef")?)),
         "FromRoadCoordinates" | "PositionInRoadCoordinates" => {
             let along_m = source.number(inner, "pathS")?;
-            let beside = Beside::Road(source.number_or(inner, "t", 0.0)?);
+            let beside = Beside::Road(source.left_or_0(inner, "t")?);
             Some(PositionKind::OnRoute { route, along_m, beside })
         }
         "FromLaneCoordinates" | "PositionInLaneCoordinates" => {
             let along_m = source.number(inner, "pathS")?;
             let lane = source.integer(inner, "laneId")?;
-            let beside = Beside::Lane(lane, source.number_or(inner, "laneOffset", 0.0)?);
+            let beside = Beside::Lane(lane, source.left_or_0(inner, "laneOffset")?);
             Some(PositionKind::OnRoute { route, along_m, beside })
         }
         _ => source.refuse(inner, "such a place on a route is not read"),
@@ -228,7 +230,7 @@ impl Position {
 
 fn heading(source: &mut Source, place: Node) -> Option<Heading> {
     let Some(orientation) = element(place, "Orientation") else { return Some(Heading::Relative(0.0)) };
-    let heading_rad = source.number_or(orientation, "h", 0.0)?;
+    let heading_rad = source.left_or_0(orientation, "h")?;
     for tilt in ["p", "r"] {
         if source.number_or(orientation, tilt, 0.0)? != 0.0 {
             source.note("nobody is tilted: pitch and roll are not taken over");

@@ -7,7 +7,7 @@ use avastra_base::geometry::{Path, Vec2, wrap_angle};
 use avastra_campaign::emit::lane_point;
 use avastra_lang::model::SPAWN_SPEED_MPS;
 use avastra_lang::model::command::OFFSET_M;
-use avastra_road::{LIMIT_MPS_DEFAULT, LanePlace, Route};
+use avastra_road::{LEVEL_SLOPE_MAX, LIMIT_MPS_DEFAULT, LanePlace, Route};
 use avastra_world::sim::VehicleParameters;
 
 use super::action::{ActKind, Headway, Speed};
@@ -133,6 +133,12 @@ impl Scene {
                 return source.refuse(&story.ego.mark, format!("the way of the ego vehicle: {error}"));
             }
         };
+        if route.steepest(&map) > LEVEL_SLOPE_MAX {
+            source.note("slopes of the map are not driven: everything drives as on the flat");
+        }
+        if route.obstacles(&map).next().is_some() {
+            source.note("solid objects of the map stand on the way of the ego vehicle: whatever drives passes through them");
+        }
         let ego_mps = speed(source, story, &story.ego, 0)?;
         source.note(
             "the ego vehicle is avastra's own: 4.70 m long and 2.06 m wide, with its rear axle where the file's has its own",

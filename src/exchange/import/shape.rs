@@ -1,6 +1,6 @@
 //! The ways that trajectories of a file lead: straight pieces, clothoids, curves of control points.
 
-use avastra_base::geometry::{Path, Pose, Vec2, unit_vector};
+use avastra_base::geometry::{Path, Pose, Vec2, unit_vector, wrap_angle};
 use roxmltree::Node;
 
 use super::catalogue;
@@ -63,6 +63,10 @@ pub struct Drawn {
     pub path: Path,
     /// Stations with the times at which they are reached, m and s; empty if the file says none.
     pub timed: Vec<(f64, f64)>,
+    /// Whether some of its vertices have a time and others have none.
+    pub is_timed_in_part: bool,
+    /// The vertex whose stated heading is farthest from the way's direction there, and by how much, rad.
+    pub turned: Option<(Mark, f64)>,
 }
 
 /// The shape within a `TrajectoryRef`, or within a `FollowTrajectoryAction` of 1.0.
@@ -110,13 +114,17 @@ fn shape_in(source: &mut Source, trajectory: Node) -> Option<Shape> {
                     Some(place) => Some(position(source, place)?),
                     None => None,
                 };
+                let turns = source.number_or(node, "hOffset", 0.0)? != 0.0;
+                source.refuse_if(turns, node, "`hOffset` is a corner in the way, which is not read")?;
+                drops_times |= node.has_attribute("timeStart");
                 segments.push(Segment {
                     start,
-                    from_per_m: source.number(node, "curvatureStart")?,
-                    to_per_m: source.number(node, "curvatureEnd")?,
+                    from_per_m: source.left(node, "curvatureStart")?,
+                    to_per_m: source.left(node, "curvatureEnd")?,
                     length_m: source.amount(node, "length")?,
                 });
             }
+            drops_times |= inner.has_attribute("timeEnd");
             source.refuse_if(segments.is_empty(), inner, "it has no segments")?;
             source.refuse_if(segments.len() > PIECES_MAX, inner, "it has too many segments")?;
             ShapeKind::Spline(segments)
@@ -125,13 +133,10 @@ fn shape_in(source: &mut Source, trajectory: Node) -> Option<Shape> {
             let place = source.required(inner, "Position")?;
             let start = Some(position(source, place)?);
             let length_m = source.amount(inner, "length")?;
-            let from_per_m = source.number(inner, "curvature")?;
+            let from_per_m = source.left(inner, "curvature")?;
             let name = if inner.has_attribute("curvaturePrime") { "curvaturePrime" } else { "curvatureDot" };
-            let to_per_m = from_per_m + source.number(inner, name)? * length_m;
-            if inner.has_attribute("startTime") || inner.has_attribute("stopTime") {
-                drops_times = true;
-                source.note("the times of a clothoid are not taken over: its road user keeps its speed");
-            }
+            let to_per_m = from_per_m + source.left(inner, name)? * length_m;
+            drops_times = inner.has_attribute("startTime") || inner.has_attribute("stopTime");
             ShapeKind::Spline(vec![Segment { start, from_per_m, to_per_m, length_m }])
         }
         "Nurbs" => {
@@ -140,12 +145,7 @@ fn shape_in(source: &mut Source, trajectory: Node) -> Option<Shape> {
             for node in elements(inner, "ControlPoint") {
                 let place = source.required(node, "Position")?;
                 controls.push((position(source, place)?, source.number_or(node, "weight", 1.0)?));
-                if node.has_attribute("time") {
-                    drops_times = true;
-                    source.note(
-                        "the times of control points are not taken over: their road user keeps its speed",
-                    );
-                }
+                drops_times |= node.has_attribute("time");
             }
             for node in elements(inner, "Knot") {
                 knots.push(source.number(node, "value")?);
@@ -165,26 +165,37 @@ fn shape_in(source: &mut Source, trajectory: Node) -> Option<Shape> {
         }
         _ => return source.refuse(inner, "such a shape is not read"),
     };
+    if drops_times {
+        source.note(
+            "the times of a clothoid or of control points are not taken over: their road user keeps its speed",
+        );
+    }
     Some(Shape { mark, drops_times, kind })
 }
 
 impl Shape {
     /// The way in the plane. `here` is where its entity is, for a way that begins there.
     pub fn drawn(&self, source: &mut Source, places: &mut Places, here: Option<Pose>) -> Option<Drawn> {
-        let mut timed = Vec::new();
+        let (mut timed, mut is_timed_in_part, mut turned) = (Vec::new(), false, None);
         let points = match &self.kind {
             ShapeKind::Polyline(vertices) => {
-                let mut points: Vec<Vec2> = Vec::new();
+                let (mut points, mut headings): (Vec<Vec2>, Vec<Option<f64>>) = (Vec::new(), Vec::new());
                 let mut station_m = 0.0;
                 for (position, time_s) in vertices {
-                    let point = places.placed(source, position)?.pose.position;
+                    let pose = places.placed(source, position)?.pose;
+                    let point = pose.position;
+                    headings.push(position.states_heading.then_some(pose.heading_rad));
                     station_m += points.last().map_or(0.0, |last| (point - last).norm());
                     timed.extend(time_s.map(|time_s| (station_m, time_s)));
                     points.push(point);
                 }
-                if timed.len() < vertices.len() {
+                is_timed_in_part = !timed.is_empty() && timed.len() < vertices.len();
+                if is_timed_in_part {
                     timed.clear();
                 }
+                let marks = vertices.iter().map(|(position, _)| position.mark.clone());
+                let all = marks.zip(turns_rad(&points, &headings));
+                turned = all.max_by(|a, b| a.1.total_cmp(&b.1));
                 points
             }
             ShapeKind::Spline(segments) => {
@@ -214,10 +225,37 @@ impl Shape {
             Some(path) if path.length_m() > WAY_M_MAX => {
                 source.refuse(&self.mark, "it is longer than a way can be")
             }
-            Some(path) => Some(Drawn { points, path, timed }),
+            Some(path) => Some(Drawn { points, path, timed, is_timed_in_part, turned }),
             None => source.refuse(&self.mark, "its way has no length"),
         }
     }
+}
+
+/// By how much each heading is turned out of the directions in which a way comes to its point and leaves it, rad; 0 of none.
+/// At an end the way is taken to bend on as it does beside it.
+fn turns_rad(points: &[Vec2], headings: &[Option<f64>]) -> Vec<f64> {
+    let ways = points.windows(2).map(|pair| pair[1] - pair[0]);
+    let known: Vec<Option<f64>> =
+        ways.map(|way| (way.norm() > 1e-6).then(|| libm::atan2(way.y, way.x))).collect();
+    let beyond = |end: f64, next: Option<f64>| next.map_or(end, |next| end + wrap_angle(end - next));
+    headings
+        .iter()
+        .enumerate()
+        .map(|(nth, heading)| {
+            let mut before = known[..nth].iter().rev().copied().flatten();
+            let mut after = known[nth..].iter().copied().flatten();
+            let (comes, leaves) = match (before.next(), after.next()) {
+                (Some(comes), Some(leaves)) => (comes, leaves),
+                (Some(comes), None) => (comes, beyond(comes, before.next())),
+                (None, Some(leaves)) => (beyond(leaves, after.next()), leaves),
+                (None, None) => return 0.0,
+            };
+            let Some(heading) = heading else { return 0.0 };
+            let [a, b] = [comes, leaves].map(|way| wrap_angle(heading - way));
+            let is_between = a * b <= 0.0 && a.abs() + b.abs() < core::f64::consts::PI;
+            if is_between { 0.0 } else { a.abs().min(b.abs()) }
+        })
+        .collect()
 }
 
 impl Segment {

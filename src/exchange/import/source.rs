@@ -75,6 +75,8 @@ pub struct Source<'f> {
     pub variables: BTreeMap<String, Option<String>>,
     /// The names of the acts that begin with the scenario.
     pub acts_at_once: BTreeSet<String>,
+    /// Whether its world is left-handed: what other files count to the left, it counts to the right.
+    pub is_left_handed: bool,
     /// The entities that have a controller of the player's.
     pub controlled: BTreeSet<String>,
     parameters: BTreeMap<String, String>,
@@ -108,6 +110,7 @@ impl<'f> Source<'f> {
             variables: BTreeMap::new(),
             parameters: BTreeMap::new(),
             acts_at_once: BTreeSet::new(),
+            is_left_handed: false,
             controlled: BTreeSet::new(),
             outer: Vec::new(),
             sees_more: 0,
@@ -167,11 +170,9 @@ impl<'f> Source<'f> {
         let before = self.parameters.clone();
         let own = elements(node, "ParameterDeclarations").flat_map(children);
         for declared in own.collect::<Vec<Node>>() {
-            let is_given = self.depth > 0
-                && declared.attribute("name").is_some_and(|name| self.parameters.contains_key(name));
-            if !is_given
-                && let (Some(name), Some(value)) = (self.text(declared, "name"), self.text(declared, "value"))
-            {
+            let Some(name) = self.named(declared, "name") else { continue };
+            let is_given = self.depth > 0 && self.parameters.contains_key(&name);
+            if !is_given && let Some(value) = self.text(declared, "value") {
                 self.parameters.insert(name, value);
             }
         }
@@ -263,11 +264,8 @@ impl<'f> Source<'f> {
     pub fn declare(&mut self, parent: Node) {
         for list in parent.children().filter(|node| node.has_tag_name("ParameterDeclarations")) {
             for declared in elements(list, "ParameterDeclaration") {
-                let Some(name) = declared.attribute("name") else {
-                    self.refuse::<()>(declared, "it has no `name`");
-                    continue;
-                };
-                let value = match self.asked.get_mut(name) {
+                let Some(name) = self.named(declared, "name") else { continue };
+                let value = match self.asked.get_mut(&name) {
                     Some((value, is_taken)) => {
                         *is_taken = true;
                         Some(value.clone())
@@ -275,7 +273,7 @@ impl<'f> Source<'f> {
                     None => self.text(declared, "value"),
                 };
                 match value.filter(|value| parameter::check(self, declared, value).is_some()) {
-                    Some(value) => drop(self.parameters.insert(name.to_owned(), value)),
+                    Some(value) => drop(self.parameters.insert(name, value)),
                     None => self.tear(&format!("${name}")),
                 }
             }
@@ -299,10 +297,10 @@ impl<'f> Source<'f> {
         }
     }
 
-    /// The name of a parameter of somebody else's, which is not filled in. Some files write it with its `$`.
+    /// The name of a parameter or variable, which is not filled in.
     pub fn named(&mut self, node: Node, name: &str) -> Option<String> {
         match node.attribute(name) {
-            Some(value) => Some(value.trim().trim_start_matches('$').to_owned()),
+            Some(value) => Some(plain(value).to_owned()),
             None => self.refuse(node, format!("it has no `{name}`")),
         }
     }
@@ -319,6 +317,17 @@ impl<'f> Source<'f> {
 
     pub fn number_or(&mut self, node: Node, name: &str, default: f64) -> Option<f64> {
         if node.has_attribute(name) { self.number(node, name) } else { Some(default) }
+    }
+
+    /// A way to the left, m, or a turn to the left, rad.
+    pub fn left(&mut self, node: Node, name: &str) -> Option<f64> {
+        let number = self.number(node, name)?;
+        // The sum makes no -0 of 0.
+        Some(if self.is_left_handed { 0.0 - number } else { number })
+    }
+
+    pub fn left_or_0(&mut self, node: Node, name: &str) -> Option<f64> {
+        if node.has_attribute(name) { self.left(node, name) } else { Some(0.0) }
     }
 
     pub fn integer(&mut self, node: Node, name: &str) -> Option<i32> {
@@ -392,6 +401,11 @@ impl<'f> Source<'f> {
 
 fn pair((name, value): (&String, &String)) -> (String, String) {
     (name.clone(), value.clone())
+}
+
+/// The name of a parameter or variable as others refer to it. Some files write the `$` before it, also where they declare it.
+pub fn plain(name: &str) -> &str {
+    name.trim().trim_start_matches('$')
 }
 
 /// A value with its parameters: `$name` and `${$name / 3.6}`.

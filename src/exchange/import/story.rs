@@ -2,6 +2,7 @@
 //! others do when.
 
 use std::collections::BTreeSet;
+use std::rc::Rc;
 
 use roxmltree::{Document, Node};
 
@@ -14,8 +15,10 @@ use super::body::{Body, body};
 use super::catalogue;
 use super::position::Position;
 use super::sky::{Change, Sky};
-use super::source::{Mark, Source, children, element, elements};
-use super::trigger::{GROUPS_MAX, Trigger, When, acts_at_once, both, is_less, reduced, trigger};
+use super::source::{Mark, Source, children, element, elements, plain};
+use super::trigger::{
+    Condition, Edge, GROUPS_MAX, Trigger, When, acts_at_once, both, conditions, is_less, reduced, trigger,
+};
 use super::weather::{Weather, weather};
 
 /// The latest minor version that is read.
@@ -77,6 +80,8 @@ pub struct Event {
     pub overwrites: bool,
     /// Whether the file lets it happen several times.
     pub comes_again: bool,
+    /// What stops its act: where, and when.
+    pub stop: Option<Rc<(Mark, Trigger)>>,
 }
 
 impl Entity {
@@ -90,7 +95,8 @@ impl Event {
     /// What somebody does from the beginning.
     fn of_init(mark: Mark, kind: ActKind) -> Event {
         let acts = vec![Act { mark: mark.clone(), kind }];
-        Event { mark, names: Vec::new(), when: Vec::new(), acts, overwrites: false, comes_again: false }
+        let (names, when) = (Vec::new(), Vec::new());
+        Event { mark, names, when, acts, overwrites: false, comes_again: false, stop: None }
     }
 
     pub fn name(&self) -> &str {
@@ -215,6 +221,14 @@ pub fn check_header<'a, 'input>(source: &mut Source, root: Node<'a, 'input>) -> 
     if source.integer(header, "revMajor")? != 1 || !(0..=MINOR_MAX).contains(&source.minor) {
         return source.refuse(header, format!("OpenSCENARIO XML of 1.0 to 1.{MINOR_MAX} is read"));
     }
+    // So ScenarioRunner marks files that count as CARLA does.
+    source.is_left_handed =
+        header.attribute("description").is_some_and(|description| description.starts_with("CARLA:"));
+    if source.is_left_handed {
+        source.note(
+            "the description begins with `CARLA:`, so its world is left-handed: `y`, headings and offsets count to the right",
+        );
+    }
     Some(header)
 }
 
@@ -229,13 +243,13 @@ fn own_limit_mps(source: &mut Source, header: Node) -> Option<f64> {
 /// Notes the variables of the file: their values, or that the story sets them.
 fn variables(source: &mut Source, root: Node) {
     for one in elements(root, "VariableDeclarations").flat_map(children) {
-        if let (Some(name), Some(value)) = (source.text(one, "name"), source.text(one, "value")) {
+        if let (Some(name), Some(value)) = (source.named(one, "name"), source.text(one, "value")) {
             source.variables.insert(name, Some(value));
         }
     }
     let set = root.descendants().filter(|node| node.has_tag_name("VariableAction"));
     for name in set.filter_map(|node| node.attribute("variableRef")) {
-        source.variables.insert(name.to_owned(), None);
+        source.variables.insert(plain(name).to_owned(), None);
     }
 }
 
@@ -322,6 +336,7 @@ impl Cast {
 
     fn act(&mut self, source: &mut Source, act: Node) {
         let mut begins = None;
+        let before: Vec<usize> = self.others.iter().map(|entity| entity.events.len()).collect();
         for group in elements(act, "ManeuverGroup") {
             if !is_carried_out(source, group) {
                 continue;
@@ -359,10 +374,18 @@ impl Cast {
                 }
             }
         }
-        if begins.is_some()
-            && let Some(stop) = element(act, "StopTrigger").filter(|stop| children(*stop).next().is_some())
-        {
-            source.refuse::<()>(stop, "an act goes on to the end of the scenario");
+        let Some(stop) = element(act, "StopTrigger").filter(|stop| children(*stop).next().is_some()) else {
+            return;
+        };
+        if self.others.iter().zip(&before).all(|(entity, from)| entity.events.len() == *from) {
+            return;
+        }
+        let Some(when) = conditions(source, stop).map(reduced) else { return };
+        // What never comes stops nothing.
+        let Some(when) = when else { return };
+        let stop = Rc::new((source.mark(stop), when));
+        for (entity, from) in self.others.iter_mut().zip(before) {
+            entity.events[from..].iter_mut().for_each(|event| event.stop = Some(Rc::clone(&stop)));
         }
     }
 
@@ -435,10 +458,11 @@ impl Cast {
                         source.refuse::<()>(event, reason);
                         return;
                     }
-                    let comes_again = [event, scope.group].into_iter().any(|node| comes_again(source, node));
+                    let times = executions(source, event) * executions(source, scope.group);
                     let overwrites = matches!(priority, Some("override" | "overwrite"));
                     let (names, when) = (names.clone(), when.clone());
-                    entity.events.push(Event { mark, names, when, acts, overwrites, comes_again });
+                    let event = Event { mark, names, when, acts, overwrites, comes_again: false, stop: None };
+                    entity.repeat(source, event, times);
                 }
             }
         }
@@ -528,6 +552,57 @@ impl Scope<'_, '_> {
 }
 
 impl Entity {
+    /// Adds an event that is carried out so often. What holds from a time on holds again as soon as the event has ended.
+    fn repeat(&mut self, source: &mut Source, event: Event, times: f64) {
+        let conditions = || event.when.iter().flatten();
+        let is_time =
+            |one: &Condition| matches!(one.kind, When::Always | When::After(_) | When::Ended { .. });
+        let holds_on = conditions().all(|one| is_time(one) && one.edge == Edge::None);
+        let comes_once =
+            event.when.iter().any(|all| all.iter().any(|one| is_time(one) && one.edge == Edge::Rising))
+                && event.when.len() == 1;
+        if times < 2.0 || comes_once || event.acts.is_empty() {
+            self.events.push(event);
+            return;
+        }
+        if event.acts.iter().all(Act::is_the_same_again) {
+            source.note(
+                "what a file lets happen several times happens once, where its goal is the same each time",
+            );
+            self.events.push(Event { comes_again: true, ..event });
+            return;
+        }
+        if !holds_on {
+            let reason = "it happens again whenever its conditions hold again, which is read of times alone: \
+                          `maximumExecutionCount=\"1\"` is read";
+            source.refuse::<()>(&event.mark, reason);
+            return;
+        }
+        if self.events.len() as f64 + times > PHASES_MAX as f64 {
+            source.refuse::<()>(
+                &event.mark,
+                format!("with it happening again, more than {PHASES_MAX} events of one entity"),
+            );
+            return;
+        }
+        let mut when = event.when.clone();
+        for nth in 1..=times as usize {
+            let mut one = Event { when, ..event.clone() };
+            let name = format!("{} ×{nth}", event.name());
+            let (mark, kind) = (event.mark.clone(), When::Ended { kind: "event", name: name.clone() });
+            when = vec![vec![Condition {
+                mark,
+                edge: Edge::None,
+                delay_s: 0.0,
+                kind,
+                is_of_act: false,
+                is_running: false,
+            }]];
+            one.names.push(("event", name));
+            self.events.push(one);
+        }
+    }
+
     /// What it does from the beginning.
     fn begin(&mut self, begun: Act) {
         let Act { mark, kind } = begun;
@@ -597,7 +672,7 @@ fn changes_the_world(source: &mut Source, action: Node) -> bool {
     let inner = children(action).next().unwrap_or(action);
     match inner.tag_name().name() {
         "VariableAction" => {
-            if let Some(name) = source.text(inner, "variableRef") {
+            if let Some(name) = source.named(inner, "variableRef") {
                 source.variables.insert(name, None);
             }
             false
@@ -634,24 +709,16 @@ fn of_act(source: &mut Source, act: Node) -> Option<Trigger> {
     Some(begins)
 }
 
-/// Whether something is carried out at all; one that is to be repeated is refused.
+/// Whether something is carried out at all.
 fn is_carried_out(source: &mut Source, node: Node) -> bool {
-    match source.number_or(node, "maximumExecutionCount", 1.0) {
-        Some(count) if count < 1.0 => {
-            source.refuse::<()>(node, "`maximumExecutionCount` is less than 1: leave out what never happens");
-            false
-        }
-        Some(count) if count > 1.0 => {
-            source.note("what a file lets happen several times happens once");
-            true
-        }
-        count => count.is_some(),
-    }
+    let reason = "`maximumExecutionCount` is less than 1: leave out what never happens";
+    let count = source.number_or(node, "maximumExecutionCount", 1.0);
+    count.and_then(|count| source.refuse_if(count < 1.0, node, reason)).is_some()
 }
 
-/// Whether something may happen more than once.
-fn comes_again(source: &mut Source, node: Node) -> bool {
-    source.number_or(node, "maximumExecutionCount", 1.0).is_some_and(|count| count > 1.0)
+/// How often something is carried out at most.
+fn executions(source: &mut Source, node: Node) -> f64 {
+    source.number_or(node, "maximumExecutionCount", 1.0).unwrap_or(1.0)
 }
 
 /// When the scenario ends: at the first of the times that its stop trigger names, each with what must come beside it, or when the ego

@@ -191,6 +191,11 @@ pub struct Pair {
 /// The conditions of a start trigger; without any it holds at once. `None` if one is refused.
 pub fn trigger(source: &mut Source, parent: Node) -> Option<Trigger> {
     let Some(trigger) = element(parent, "StartTrigger") else { return Some(Vec::new()) };
+    conditions(source, trigger)
+}
+
+/// The conditions of a trigger, of which the one without any has none. `None` if one is refused.
+pub fn conditions(source: &mut Source, trigger: Node) -> Option<Trigger> {
     if trigger.descendants().filter(|node| node.has_tag_name("Condition")).count() > CONDITIONS_MAX {
         return source.refuse(trigger, format!("it has more than {CONDITIONS_MAX} conditions"));
     }
@@ -254,7 +259,9 @@ fn condition(source: &mut Source, node: Node) -> Option<Trigger> {
         let kind = match inner.tag_name().name() {
             "SimulationTimeCondition" => {
                 let seconds = source.number(inner, "value")?;
-                if is_less(source, inner)? {
+                // That it is the beginning holds there, and lets begin what waits for it.
+                let is_beginning = seconds == 0.0 && inner.attribute("rule") == Some("equalTo");
+                if !is_beginning && is_less(source, inner)? {
                     return source.refuse(inner, "only times that have passed are read");
                 }
                 let reason = "times do not cease: `conditionEdge=\"falling\"` waits for nothing";
@@ -286,14 +293,14 @@ fn condition(source: &mut Source, node: Node) -> Option<Trigger> {
                 }
             }
             "ParameterCondition" => {
-                let name = source.text(inner, "parameterRef")?;
+                let name = source.named(inner, "parameterRef")?;
                 let Some(value) = source.parameter(&name).map(str::to_owned) else {
                     return source.refuse(inner, format!("no parameter is called `{name}`"));
                 };
                 constant(source, inner, &value)?
             }
             "VariableCondition" => {
-                let name = source.text(inner, "variableRef")?;
+                let name = source.named(inner, "variableRef")?;
                 match source.variables.get(&name).cloned() {
                     Some(Some(value)) => constant(source, inner, &value)?,
                     Some(None) => {

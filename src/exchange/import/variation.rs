@@ -46,7 +46,7 @@ pub fn scenario(source: &mut Source, root: Node) -> Option<Option<(String, u32)>
 /// there; `None` if something is refused.
 pub fn read(source: &mut Source, root: Node, declared: &Values, most: usize) -> Option<Distribution> {
     let found = element(root, "ParameterValueDistribution")?;
-    for (node, reason) in vocabulary::unknown(root) {
+    for (node, reason) in vocabulary::looked_over(root).unknown {
         source.refuse::<()>(node, reason);
     }
     let header = check_header(source, root)?;

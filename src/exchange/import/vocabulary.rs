@@ -4,7 +4,7 @@
 //! Only elements that are read have a row. Nothing within others is looked at: they are refused as a whole where they matter
 //! (an action that is not read), or say nothing of what is taken over (`Performance`, `License`).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use roxmltree::Node;
 
@@ -15,17 +15,18 @@ const ONE: &str = "?";
 /// Children of any name, for the same reason.
 const ANY: &str = "*";
 
-/// Each element with its attributes in brackets, and its children.
+/// Each element with its attributes in brackets, and its children. `~`: the attribute may change what the file means and is not read,
+/// so that a note says it where it stands. `-`: nothing that is taken over depends on it. docs/formats.md is the same table.
 const ELEMENTS: &str = "
     OpenSCENARIO [] FileHeader ParameterDeclarations VariableDeclarations MonitorDeclarations CatalogLocations
         RoadNetwork Entities Storyboard ParameterValueDistribution;
-    FileHeader [author date description revMajor revMinor] License Properties;
+    FileHeader [author date- description revMajor revMinor] License Properties;
     ParameterDeclarations [] ParameterDeclaration;
     ParameterDeclaration [name parameterType value] ConstraintGroup;
     ConstraintGroup [] ValueConstraint;
     ValueConstraint [rule value];
     VariableDeclarations [] VariableDeclaration;
-    VariableDeclaration [name variableType value];
+    VariableDeclaration [name variableType- value];
     CatalogLocations [] ControllerCatalog EnvironmentCatalog ManeuverCatalog MiscObjectCatalog
         PedestrianCatalog RouteCatalog TrajectoryCatalog VehicleCatalog;
     ControllerCatalog [] Directory;
@@ -45,13 +46,13 @@ const ELEMENTS: &str = "
     CatalogReference [catalogName entryName] ParameterAssignments;
     ParameterAssignments [] ParameterAssignment;
     ParameterAssignment [parameterRef value];
-    Vehicle [name vehicleCategory mass model3d role] ParameterDeclarations BoundingBox Performance Axles
+    Vehicle [name- vehicleCategory mass- model3d- role-] ParameterDeclarations BoundingBox Performance Axles
         Properties Trailer TrailerCoupler TrailerHitch;
-    Pedestrian [name pedestrianCategory mass model model3d role] ParameterDeclarations BoundingBox Properties;
-    MiscObject [name miscObjectCategory mass model3d] ParameterDeclarations BoundingBox Properties;
-    Performance [maxSpeed maxAcceleration maxAccelerationRate maxDeceleration maxDecelerationRate];
+    Pedestrian [name- pedestrianCategory mass- model- model3d- role-] ParameterDeclarations BoundingBox Properties;
+    MiscObject [name- miscObjectCategory- mass- model3d-] ParameterDeclarations BoundingBox Properties;
+    Performance [maxSpeed maxAcceleration maxAccelerationRate~ maxDeceleration maxDecelerationRate~];
     BoundingBox [] Center Dimensions;
-    Center [x y z];
+    Center [x y~ z-];
     Dimensions [height length width];
     Storyboard [] Init Story StopTrigger;
     Init [] Actions;
@@ -64,9 +65,9 @@ const ELEMENTS: &str = "
     RelativeLanePosition [entityRef dLane ds dsLane offset] Orientation;
     RoadPosition [roadId s t] Orientation;
     RelativeRoadPosition [entityRef ds dt] Orientation;
-    WorldPosition [x y z h p r];
-    RelativeWorldPosition [entityRef dx dy dz] Orientation;
-    RelativeObjectPosition [entityRef dx dy dz] Orientation;
+    WorldPosition [x y z- h p~ r~];
+    RelativeWorldPosition [entityRef dx dy dz-] Orientation;
+    RelativeObjectPosition [entityRef dx dy dz-] Orientation;
     RoutePosition [] RouteRef InRoutePosition Orientation;
     RouteRef [] Route CatalogReference;
     InRoutePosition [] ?;
@@ -99,7 +100,7 @@ const ELEMENTS: &str = "
     LaneOffsetTarget [] AbsoluteTargetLaneOffset RelativeTargetLaneOffset;
     AbsoluteTargetLaneOffset [value];
     RelativeTargetLaneOffset [entityRef value];
-    SynchronizeAction [masterEntityRef targetTolerance targetToleranceMaster] TargetPositionMaster
+    SynchronizeAction [masterEntityRef targetTolerance~ targetToleranceMaster~] TargetPositionMaster
         TargetPosition FinalSpeed;
     TargetPositionMaster [] ?;
     TargetPosition [] ?;
@@ -112,7 +113,7 @@ const ELEMENTS: &str = "
     FollowTrajectoryAction [initialDistanceOffset] Trajectory TrajectoryRef CatalogReference TimeReference
         TrajectoryFollowingMode;
     TrajectoryRef [] Trajectory CatalogReference;
-    Trajectory [name closed] ParameterDeclarations Shape;
+    Trajectory [name- closed] ParameterDeclarations Shape;
     Shape [] ?;
     Polyline [] Vertex;
     Vertex [time] Position;
@@ -127,25 +128,25 @@ const ELEMENTS: &str = "
     Timing [domainAbsoluteRelative offset scale];
     TrajectoryFollowingMode [followingMode];
     AssignRouteAction [] Route CatalogReference;
-    Route [name closed] ParameterDeclarations Waypoint;
+    Route [name- closed] ParameterDeclarations Waypoint;
     Waypoint [routeStrategy] Position;
     AcquirePositionAction [] Position;
     VisibilityAction [graphics sensors traffic] SensorReferenceSet;
     ControllerAction [] ActivateControllerAction AssignControllerAction OverrideControllerValueAction;
-    ActivateControllerAction [controllerRef objectControllerRef longitudinal lateral animation lighting];
+    ActivateControllerAction [controllerRef- objectControllerRef- longitudinal lateral animation- lighting-];
     GlobalAction [] ?;
     EntityAction [entityRef] AddEntityAction DeleteEntityAction;
     VariableAction [variableRef] SetAction ModifyAction;
     EnvironmentAction [] Environment CatalogReference;
-    Environment [name] ParameterDeclarations TimeOfDay Weather RoadCondition;
+    Environment [name-] ParameterDeclarations TimeOfDay Weather RoadCondition;
     TimeOfDay [animation dateTime];
-    Weather [atmosphericPressure cloudState fractionalCloudCover temperature] Sun Fog Precipitation Wind
+    Weather [atmosphericPressure- cloudState fractionalCloudCover temperature-] Sun Fog Precipitation Wind
         DomeImage;
-    Sun [azimuth elevation illuminance intensity];
+    Sun [azimuth- elevation- illuminance intensity-];
     Precipitation [intensity precipitationIntensity precipitationType];
     Fog [visualRange] BoundingBox;
     RoadCondition [frictionScaleFactor wetness] Properties;
-    Story [name] ParameterDeclarations Act;
+    Story [name-] ParameterDeclarations Act;
     Act [name] ManeuverGroup StartTrigger StopTrigger;
     ManeuverGroup [name maximumExecutionCount] Actors CatalogReference Maneuver;
     Actors [selectTriggeringEntities] EntityRef;
@@ -156,7 +157,7 @@ const ELEMENTS: &str = "
     StartTrigger [] ConditionGroup;
     StopTrigger [] ConditionGroup;
     ConditionGroup [] Condition;
-    Condition [name delay conditionEdge] ByEntityCondition ByValueCondition;
+    Condition [name- delay conditionEdge] ByEntityCondition ByValueCondition;
     ByValueCondition [] ?;
     SimulationTimeCondition [value rule];
     StoryboardElementStateCondition [storyboardElementType storyboardElementRef state];
@@ -180,7 +181,7 @@ const ELEMENTS: &str = "
     TraveledDistanceCondition [value];
     StandStillCondition [duration];
     CollisionCondition [] EntityRef ByType;
-    ByType [type];
+    ByType [objectType- type-];
     SpeedCondition [value rule direction];
     RelativeSpeedCondition [entityRef value rule direction];
     ParameterValueDistribution [] ScenarioFile Deterministic Stochastic;
@@ -214,17 +215,31 @@ fn rows() -> BTreeMap<&'static str, (&'static str, &'static str)> {
     ELEMENTS.split(';').filter_map(row).collect()
 }
 
-/// Every element and attribute within one that no version has where it stands, with what is wrong.
-pub fn unknown<'a, 'input>(root: Node<'a, 'input>) -> Vec<(Node<'a, 'input>, String)> {
-    let (rows, mut unknown) = (rows(), Vec::new());
+/// What is said of an element and all within it.
+pub struct Found<'a, 'input> {
+    /// Every element and attribute that no version has where it stands, with what is wrong.
+    pub unknown: Vec<(Node<'a, 'input>, String)>,
+    /// What may change what the file means and is not read.
+    pub noted: BTreeSet<String>,
+}
+
+/// Looks at an element and all within it.
+pub fn looked_over<'a, 'input>(root: Node<'a, 'input>) -> Found<'a, 'input> {
+    let (rows, mut unknown, mut noted) = (rows(), Vec::new(), BTreeSet::new());
     let mut waiting = vec![root];
     while let Some(node) = waiting.pop() {
         let name = node.tag_name().name();
         let Some((attributes, known)) = rows.get(name) else { continue };
         // Attributes of a namespace belong to the schema (`xsi:noNamespaceSchemaLocation`).
         for attribute in node.attributes().filter(|attribute| attribute.namespace().is_none()) {
-            if !attributes.split_whitespace().any(|known| known == attribute.name()) {
-                unknown.push((node, format!("it has no attribute `{}`", attribute.name())));
+            let own = attribute.name();
+            let mut named = attributes.split_whitespace().filter_map(|known| known.strip_prefix(own));
+            match named.find(|mark| matches!(*mark, "" | "-" | "~")) {
+                Some("~") if says_something(attribute.value()) => {
+                    noted.insert(format!("`{own}` of `{name}` is not taken over"));
+                }
+                Some(_) => {}
+                None => unknown.push((node, format!("it has no attribute `{own}`"))),
             }
         }
         if *known == ONE {
@@ -243,7 +258,13 @@ pub fn unknown<'a, 'input>(root: Node<'a, 'input>) -> Vec<(Node<'a, 'input>, Str
             }
         }
     }
-    unknown
+    Found { unknown, noted }
+}
+
+/// Whether a value is another one than what holds without it.
+fn says_something(value: &str) -> bool {
+    let value = value.trim();
+    !(matches!(value, "" | "false") || value.parse::<f64>().is_ok_and(|number| number == 0.0))
 }
 
 #[cfg(test)]

@@ -20,6 +20,9 @@ const NEAR_M: f64 = 1.5;
 /// One that goes on from another way does so this near to its end, m.
 const JOINED_M: f64 = 0.2;
 
+/// Headings of vertices may be so far from the direction of the way, rad: as much as a driver on a curve is beside its chord.
+const LOOKS_RAD: f64 = 0.1;
+
 /// A trajectory as a part of somebody's way.
 #[derive(Debug)]
 pub struct Leg<'a> {
@@ -125,6 +128,17 @@ impl<'a> Cast<'a> {
             places.stand(&entity.name, placed);
         }
         let found = found?;
+        let is_in_part = way.timing.is_some() && found.is_timed_in_part;
+        source.refuse_if(is_in_part, mark, "all of its vertices have a time, or none has one")?;
+        if let Some((mark, turned_rad)) = found.turned.as_ref().filter(|_| !way.is_steered) {
+            let reason = format!(
+                "its heading is {turned_rad:.2} rad beside the direction of the way there: who follows a way looks along it"
+            );
+            source.refuse_if(*turned_rad > LOOKS_RAD && !entity.body.is_on_foot(), mark, reason)?;
+            if *turned_rad > 0.01 {
+                source.note("who follows a way looks along it, also where its vertices have other headings");
+            }
+        }
         let begins = found.path.pose_at(way.from_m);
         source.refuse_if(
             !is_first && way.from_m > 0.0,

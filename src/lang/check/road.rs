@@ -16,7 +16,7 @@ use crate::model::{
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, print_expr};
 use avastra_base::units::{Dimension, Rational};
-use avastra_road::{LanePlace, RoadError, RoadMap, Route, SignKind};
+use avastra_road::{LEVEL_SLOPE_MAX, LanePlace, Obstacle, RoadError, RoadMap, Route, SignKind};
 
 /// Least speed that an ego vehicle may want, m/s: it has to arrive.
 const SET_MPS_MIN: f64 = 1.0;
@@ -115,6 +115,7 @@ impl Checker {
                 "mend the map, or choose places between which it has none; `avastra road MAP` lists the gaps",
             ));
         }
+        self.warn_of_undriven(block, &map, &route);
         let ego_mps = match field(&fields, RoadField::EgoSpeed) {
             Some(value) => self.road_speed(value, RoadField::EgoSpeed, "a speed", 0.0),
             None => Some(START_MPS),
@@ -181,6 +182,30 @@ impl Checker {
                 true => stations.for_each(|station| self.references.number(station)),
                 false => self.look_at(&field.value, &Place::default(), None),
             }
+        }
+    }
+
+    /// Warns of what the map has on a route and no driver knows.
+    fn warn_of_undriven(&mut self, block: &ast::Block, map: &RoadMap, route: &Route) {
+        let name = &block.name;
+        let slope = route.steepest(map);
+        if slope > LEVEL_SLOPE_MAX {
+            let message = format!("the slopes of road `{}` are not driven", name.text);
+            let label = format!("up to {:.0} %: everything drives as on the flat", slope * 100.0);
+            let help = "speeds and braking ways are those of a level road: choose a level part, or mind it in what you conclude";
+            self.report(Diagnostic::warning(code::NOT_DRIVEN, message).at(name.span, label).help(help));
+        }
+        let count = route.obstacles(map).count();
+        if let Some(Obstacle { what, place }) = route.obstacles(map).next() {
+            let message = format!("solid objects of the map stand on the route of road `{}`", name.text);
+            let lane = map.lane(place.lane);
+            let s_m = lane.road_station_m(place.station_m);
+            let label = format!(
+                "{count}, the first of them {what} in lane {}/{} at {s_m:.1} m: whatever drives passes through it",
+                lane.key.road, lane.key.lane
+            );
+            let help = "to have drivers see it and hit it, spawn an `Object` there";
+            self.report(Diagnostic::warning(code::NOT_DRIVEN, message).at(name.span, label).help(help));
         }
     }
 

@@ -79,6 +79,14 @@ impl Cubics {
         self.0.len() < 2 && self.0.iter().all(is_flat)
     }
 
+    /// The pieces that hold between two distances, counted from the first of them.
+    pub fn between(&self, from_m: f64, to_m: f64) -> Cubics {
+        let begun = self.0.partition_point(|piece| piece.begin_m <= from_m).max(1) - 1;
+        let there = self.0.get(begun..).unwrap_or_default().iter();
+        let there = there.take_while(|piece| piece.begin_m < to_m || piece.begin_m <= from_m);
+        Cubics(there.map(|piece| Cubic { begin_m: piece.begin_m - from_m, ..*piece }).collect())
+    }
+
     /// 0 if there are no pieces.
     pub fn at(&self, station_m: f64) -> Jet {
         let after = self.0.partition_point(|piece| piece.begin_m <= station_m);

@@ -29,10 +29,6 @@ pub struct RoadElement {
     pub left_hand: bool,
     pub predecessor: Option<RoadLink>,
     pub successor: Option<RoadLink>,
-    /// Station from which a speed limit holds, m, and the limit, m/s; `None` where it ends. By rising station.
-    pub speeds: Vec<(f64, Option<f64>)>,
-    /// Whether all of it is a motorway.
-    pub is_motorway: bool,
     pub reference: ReferenceLine,
     /// Height of the reference line, m. Banks and crossfalls are not read.
     pub elevation: Cubics,
@@ -56,6 +52,25 @@ pub enum Contact {
     End,
 }
 
+/// What a record says of the speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Limit {
+    /// m/s.
+    Of(f64),
+    /// There is none.
+    No,
+    Unstated,
+}
+
+/// A kind of road, from a station on.
+#[derive(Debug, Clone, Copy)]
+pub struct TypeElement {
+    pub begin_m: f64,
+    pub limit: Limit,
+    pub is_motorway: bool,
+}
+
+/// A lane section, or a piece of one (`cut`).
 #[derive(Debug, Clone)]
 pub struct SectionElement {
     pub begin_m: f64,
@@ -70,7 +85,9 @@ pub struct LaneElement {
     pub line: u32,
     /// Why no car drives on it, in one direction; `None` for a driving lane.
     pub undriven: Option<LeftOut>,
-    /// Whether it is a driving lane for buses.
+    /// What holds on it, as `cut` finds: its limit, whether its road is a motorway, and whether it is for buses.
+    pub limit: Limit,
+    pub is_motorway: bool,
     pub for_buses: bool,
     /// What a lane that is no driving lane is to people on foot.
     pub beside: Option<StripKind>,
@@ -79,8 +96,10 @@ pub struct LaneElement {
     pub borders: Cubics,
     pub predecessors: Vec<i32>,
     pub successors: Vec<i32>,
-    /// As in [`RoadElement::speeds`], from the section's beginning.
-    pub speeds: Vec<(f64, Option<f64>)>,
+    /// Limits of its own, each from a distance on from the section's beginning, m, by rising distance.
+    pub speeds: Vec<(f64, Limit)>,
+    /// In the same way, whether it is for buses.
+    pub buses: Vec<(f64, bool)>,
     /// Markings of its outer line, by rising beginning.
     pub marks: Vec<MarkElement>,
 }
@@ -139,7 +158,11 @@ pub enum Orientation {
 #[derive(Debug, Clone)]
 pub struct ObjectElement {
     pub id: String,
+    /// The file's word for what it is.
+    pub word: String,
     pub kind: ObjectKind,
+    /// Whether it stands on the ground, and so in the way of whatever drives there.
+    pub is_on_the_ground: bool,
     pub s_m: f64,
     pub t_m: f64,
     pub heading_rad: f64,
@@ -188,6 +211,34 @@ pub struct ControllerElement {
     pub id: String,
     /// Ids of the signals it switches, with their lines.
     pub signals: Vec<(String, u32)>,
+}
+
+impl LaneElement {
+    /// The part between two distances from the section's beginning, m.
+    pub fn between(&self, from_m: f64, to_m: f64) -> LaneElement {
+        let marks = self.marks.iter().filter(|mark| mark.begin_m < to_m);
+        let marks = marks.map(|mark| MarkElement { begin_m: mark.begin_m - from_m, ..*mark });
+        // Of the marks that have begun, the last one holds.
+        let mut marks: Vec<MarkElement> = marks.collect();
+        let begun = marks.partition_point(|mark| mark.begin_m <= 0.0);
+        marks.drain(..begun.max(1) - 1);
+        LaneElement {
+            id: self.id,
+            line: self.line,
+            undriven: self.undriven.clone(),
+            limit: self.limit,
+            is_motorway: self.is_motorway,
+            for_buses: self.for_buses,
+            beside: self.beside,
+            widths: self.widths.between(from_m, to_m),
+            borders: self.borders.between(from_m, to_m),
+            predecessors: self.predecessors.clone(),
+            successors: self.successors.clone(),
+            speeds: Vec::new(),
+            buses: Vec::new(),
+            marks,
+        }
+    }
 }
 
 impl SignalElement {

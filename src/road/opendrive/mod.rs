@@ -4,14 +4,16 @@
 //! and everything that does not say where a vehicle may drive or must stop, or where people may walk.
 
 mod cubic;
+mod cut;
 mod elements;
 mod geometry;
 mod read;
+mod vocabulary;
 mod xml;
 
 pub use elements::{
-    Across, Contact, ControllerElement, Document, JunctionElement, LaneElement, MarkRule, Meaning,
-    ObjectKind, Orientation, Outline, RoadElement, RoadLink, SectionElement, SignalElement,
+    Across, Contact, ControllerElement, Document, JunctionElement, LaneElement, Limit, MarkRule, Meaning,
+    ObjectElement, ObjectKind, Orientation, Outline, RoadElement, RoadLink, SectionElement, SignalElement,
 };
-pub use read::{read, well_formed};
+pub use read::{read, well_formed, xml_text};
 pub use xml::{Lines, wrong};

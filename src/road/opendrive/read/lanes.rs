@@ -2,7 +2,7 @@
 
 use crate::{LeftOut, RoadError, StripKind};
 
-use super::super::elements::{LaneElement, MarkElement, MarkRule, SectionElement};
+use super::super::elements::{LaneElement, Limit, MarkElement, MarkRule, SectionElement};
 use super::super::xml::{Element, wrong};
 use super::{Reader, cubics};
 
@@ -88,11 +88,18 @@ impl Reader {
         let marks = lane.children("roadMark");
         let mut marks: Vec<MarkElement> = marks.map(|mark| road_mark(mark, id)).collect::<Result<_, _>>()?;
         marks.sort_by(|a, b| a.begin_m.total_cmp(&b.begin_m));
+        let mut buses = self.kept_for_buses(lane)?;
+        if kind == "bus" {
+            buses = vec![(0.0, true)];
+        }
         Ok(LaneElement {
             id,
             line: lane.line(),
             undriven,
-            for_buses: kind == "bus" || self.is_kept_for_buses(lane),
+            limit: Limit::Unstated,
+            is_motorway: false,
+            for_buses: false,
+            buses,
             beside,
             widths,
             borders,
@@ -105,10 +112,21 @@ impl Reader {
 }
 
 impl Reader {
-    /// Whether `access` keeps cars out of a lane and lets buses in.
-    fn is_kept_for_buses(&mut self, lane: Element) -> bool {
-        let (mut for_buses, mut for_cars, mut without_cars, mut for_others) = (false, false, false, false);
+    /// From which distances on `access` keeps cars out of a lane and lets buses in, or no longer does, m. The records of one
+    /// distance belong together, and hold until the next.
+    fn kept_for_buses(&mut self, lane: Element) -> Result<Vec<(f64, bool)>, RoadError> {
+        let mut records = Vec::new();
         for access in lane.children("access") {
+            records.push((access.number_or("sOffset", 0.0)?, access));
+        }
+        records.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let groups = records.chunk_by(|a, b| a.0 == b.0);
+        Ok(groups.map(|group| (group[0].0, self.is_kept_for_buses(group))).collect())
+    }
+
+    fn is_kept_for_buses(&mut self, records: &[(f64, Element)]) -> bool {
+        let (mut for_buses, mut for_cars, mut without_cars, mut for_others) = (false, false, false, false);
+        for (_, access) in records {
             // Without a rule, as before OpenDRIVE 1.6, a restriction says who alone may use the lane.
             let allows = access.attribute("rule") != Some("deny");
             let named = access.children("restriction").filter_map(|one| one.attribute("type"));

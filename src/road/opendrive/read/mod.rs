@@ -6,9 +6,12 @@ use crate::RoadError;
 use avastra_base::geometry::Vec2;
 
 use super::cubic::{Cubic, Cubics};
+use super::cut::cut;
 use super::elements::{
-    ConnectionElement, Contact, ControllerElement, Document, JunctionElement, RoadElement, RoadLink,
+    ConnectionElement, Contact, ControllerElement, Document, JunctionElement, Limit, RoadElement, RoadLink,
+    TypeElement,
 };
+use super::vocabulary;
 use super::xml::{Element, Lines, wrong};
 
 mod lanes;
@@ -36,8 +39,82 @@ fn not_xml(text: &str, error: &roxmltree::Error) -> RoadError {
 /// If it is not well-formed, and in which line.
 pub fn well_formed(text: &str) -> Result<roxmltree::Document<'_>, RoadError> {
     refuse_costly_tags(text)?;
-    roxmltree::Document::parse(text).map_err(|error| not_xml(text, &error))
+    let parsed = match roxmltree::Document::parse(text) {
+        Err(roxmltree::Error::DtdDetected) => {
+            if let Some(begin) = declaring_type(text) {
+                let line = Lines::new(text).of(begin);
+                let message = "a document type with declarations of its own (`<!DOCTYPE … [`) is not read: take them out";
+                return Err(wrong(line, message));
+            }
+            let options =
+                roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() };
+            roxmltree::Document::parse_with_options(text, options)
+        }
+        parsed => parsed,
+    };
+    parsed.map_err(|error| not_xml(text, &error))
 }
+
+/// Where a document type begins that has declarations of its own, which may let a short text stand for a long one.
+fn declaring_type(text: &str) -> Option<usize> {
+    let declares = |(begin, _): &(usize, &str)| {
+        let mut quote = None;
+        for byte in text[*begin..].bytes() {
+            match (quote, byte) {
+                (None, b'[') => return true,
+                (None, b'>') => return false,
+                (None, b'"' | b'\'') => quote = Some(byte),
+                (Some(open), _) if open == byte => quote = None,
+                _ => {}
+            }
+        }
+        true
+    };
+    text.match_indices("<!DOCTYPE").find(declares).map(|(begin, _)| begin)
+}
+
+/// The text of an XML file: UTF-8, UTF-16, or the Latin-1 that it declares.
+///
+/// # Errors
+/// If it is none of these, what it is.
+pub fn xml_text(bytes: Vec<u8>) -> Result<String, String> {
+    let wide = match bytes[..] {
+        [0xFF, 0xFE, ..] | [b'<', 0, ..] => Some(u16::from_le_bytes as fn([u8; 2]) -> u16),
+        [0xFE, 0xFF, ..] | [0, b'<', ..] => Some(u16::from_be_bytes as fn([u8; 2]) -> u16),
+        _ => None,
+    };
+    if let Some(unit) = wide {
+        let units = bytes.chunks_exact(2).map(|pair| unit([pair[0], pair[1]]));
+        let text: Result<String, _> = char::decode_utf16(units).collect();
+        let text =
+            text.map_err(|_| "not text: it begins as UTF-16 and goes on as something else".to_owned())?;
+        return Ok(text.trim_start_matches('\u{feff}').to_owned());
+    }
+    let bytes = match String::from_utf8(bytes) {
+        Ok(text) => return Ok(text),
+        Err(error) => error.into_bytes(),
+    };
+    let declaration: String = bytes
+        .iter()
+        .take(DECLARATION_BYTES_MAX)
+        .map(|byte| char::from(*byte))
+        .take_while(|one| *one != '>')
+        .collect();
+    let named = declaration.split_once("encoding").and_then(|(_, rest)| rest.split(['"', '\'']).nth(1));
+    let encoding = named.unwrap_or("UTF-8").to_ascii_lowercase();
+    let is_latin = ["iso-8859-1", "latin1", "latin-1", "us-ascii"].contains(&encoding.as_str());
+    // Windows' own has other letters in place of the control characters alone.
+    let is_plain = || !bytes.iter().any(|byte| (0x80..0xA0).contains(byte));
+    match is_latin || encoding == "windows-1252" && is_plain() {
+        true => Ok(bytes.iter().map(|byte| char::from(*byte)).collect()),
+        false => Err(format!(
+            "not text: its encoding `{encoding}` is not read, or it is another one; save it as UTF-8"
+        )),
+    }
+}
+
+/// The declaration of an XML file ends before this.
+const DECLARATION_BYTES_MAX: usize = 200;
 
 /// Limit on the attributes of an element; no element of OpenDRIVE has more than thirty. The XML reader compares
 /// every attribute of an element with every other.
@@ -123,8 +200,9 @@ pub fn read(name: &str, text: &str) -> Result<Document, RoadError> {
     if roads.is_empty() {
         return Err(root.wrong("the map holds no `road`"));
     }
-    let junctions = root.children("junction").map(junction).collect::<Result<_, _>>()?;
+    let junctions = root.children("junction").map(|one| reader.junction(one)).collect::<Result<_, _>>()?;
     let controllers = root.children("controller").map(controller).collect::<Result<_, _>>()?;
+    vocabulary::unread(document.root_element()).for_each(|what| reader.ignore(what));
     let (mut warnings, warned_at) = (reader.warnings, reader.warned_at);
     warnings
         .extend(reader.ignored.into_iter().map(|(what, times)| format!("ignored {what} ({times} times)")));
@@ -148,6 +226,8 @@ struct Reader {
     ignored: BTreeMap<String, usize>,
     /// Corners and copies of all objects so far.
     corners: usize,
+    /// Lanes of sections that were cut so far.
+    lanes_cut: usize,
 }
 
 impl Reader {
@@ -180,18 +260,24 @@ impl Reader {
         let junction = road.attribute("junction").filter(|id| !id.is_empty() && *id != "-1");
         let link = |name: &str| {
             let link = road.child("link").and_then(|link| link.child(name));
-            link.map(road_link).transpose()
+            link.map(road_link).transpose().map(Option::flatten)
         };
         let (predecessor, successor) = (link("predecessor")?, link("successor")?);
-        let mut speeds = Vec::new();
-        let mut types = road.children("type").map(|kind| kind.attribute("type")).peekable();
-        let is_motorway = types.peek().is_some() && types.all(|kind| kind == Some("motorway"));
+        let mut types = Vec::new();
         for kind in road.children("type") {
             let limit = kind.child("speed").map(|speed| self.speed(speed)).transpose()?;
-            speeds.push((kind.number_or("s", 0.0)?, limit.flatten()));
+            types.push(TypeElement {
+                begin_m: kind.number_or("s", 0.0)?,
+                limit: limit.unwrap_or(Limit::Unstated),
+                is_motorway: kind.attribute("type") == Some("motorway"),
+            });
         }
         // OpenDRIVE asks for this order; not every file keeps it.
-        speeds.sort_by(|a, b| a.0.total_cmp(&b.0));
+        types.sort_by(|a, b| a.begin_m.total_cmp(&b.begin_m));
+        // What is said first holds before it, too.
+        if let Some(first) = types.first_mut() {
+            first.begin_m = first.begin_m.min(0.0);
+        }
         let elevation = self.elevation(road);
         self.ignore_slopes(road)?;
         if let Some(rule) = road.attribute("rule").filter(|rule| !["LHT", "RHT"].contains(rule)) {
@@ -205,16 +291,58 @@ impl Reader {
             left_hand: road.attribute("rule") == Some("LHT"),
             predecessor,
             successor,
-            speeds,
-            is_motorway,
             reference: self.reference_line(road, &id, length_m)?,
             elevation,
             lane_offset: cubics(lanes.children("laneOffset"), "s")?,
-            sections: self.sections(lanes, &id, length_m)?,
+            sections: cut(self.sections(lanes, &id, length_m)?, &types, &mut self.lanes_cut)?,
             signals: self.signals(road),
             objects: self.objects(road)?,
             id,
             length_m,
+        })
+    }
+
+    fn junction(&mut self, junction: Element) -> Result<JunctionElement, RoadError> {
+        // It has no place where a way ends and another begins: lanes that leave in the middle of a lane are not in the graph.
+        let is_virtual = junction.attribute("type") == Some("virtual");
+        if is_virtual {
+            let message = format!(
+                "junction `{}` is virtual: its connections lead off in the middle of a road, and are left out",
+                junction.attribute("id").unwrap_or("")
+            );
+            self.warn(junction, message);
+        }
+        let connections = junction.children("connection").filter(|_| !is_virtual).map(|connection| {
+            let links = connection.children("laneLink");
+            Ok(ConnectionElement {
+                line: connection.line(),
+                incoming_road: connection.text("incomingRoad")?.to_owned(),
+                connecting_road: match connection.attribute("connectingRoad") {
+                    Some(road) => road.to_owned(),
+                    // A direct junction (1.7) links two roads without a connecting road.
+                    None => connection.text("linkedRoad")?.to_owned(),
+                },
+                contact: contact(connection)?,
+                lane_links: links
+                    .map(|link| Ok((link.integer("from")?, link.integer("to")?)))
+                    .collect::<Result<_, _>>()?,
+            })
+        });
+        let controllers = junction.children("controller");
+        Ok(JunctionElement {
+            line: junction.line(),
+            id: junction.text("id")?.to_owned(),
+            name: junction.attribute("name").unwrap_or("").to_owned(),
+            connections: connections.collect::<Result<_, _>>()?,
+            priorities: junction
+                .children("priority")
+                .filter_map(|entry| {
+                    Some((entry.attribute("high")?.to_owned(), entry.attribute("low")?.to_owned()))
+                })
+                .collect(),
+            controllers: controllers
+                .map(|entry| Ok((entry.text("id")?.to_owned(), entry.line())))
+                .collect::<Result<_, _>>()?,
         })
     }
 
@@ -253,10 +381,11 @@ impl Reader {
         Ok(())
     }
 
-    /// A limit in m/s; `None` for `no limit` and `undefined`.
-    fn speed(&mut self, speed: Element) -> Result<Option<f64>, RoadError> {
-        if matches!(speed.attribute("max"), Some("no limit" | "undefined")) {
-            return Ok(None);
+    fn speed(&mut self, speed: Element) -> Result<Limit, RoadError> {
+        match speed.attribute("max") {
+            Some("no limit") => return Ok(Limit::No),
+            Some("undefined") => return Ok(Limit::Unstated),
+            _ => {}
         }
         let factor = match speed.attribute("unit").unwrap_or("m/s") {
             "m/s" => 1.0,
@@ -271,9 +400,9 @@ impl Reader {
         if limit_mps <= 0.0 {
             // Some tools write 0 or -1 for "none".
             self.warn(speed, format!("ignored a speed limit of {limit_mps} m/s"));
-            return Ok(None);
+            return Ok(Limit::Unstated);
         }
-        Ok(Some(limit_mps))
+        Ok(Limit::Of(limit_mps))
     }
 }
 
@@ -293,11 +422,15 @@ fn cubics<'a, 'input: 'a>(
     pieces.collect::<Result<_, _>>().map(Cubics::new)
 }
 
-fn road_link(link: Element) -> Result<RoadLink, RoadError> {
+/// What a road's end touches; `None` of a link to the middle of a road, as in virtual junctions, which have their own warning.
+fn road_link(link: Element) -> Result<Option<RoadLink>, RoadError> {
+    if link.attribute("elementS").is_some() {
+        return Ok(None);
+    }
     let (id, line) = (link.text("elementId")?.to_owned(), link.line());
     match link.attribute("elementType").unwrap_or("road") {
-        "junction" => Ok(RoadLink::Junction { id, line }),
-        "road" => Ok(RoadLink::Road { id, contact: contact(link)?, line }),
+        "junction" => Ok(Some(RoadLink::Junction { id, line })),
+        "road" => Ok(Some(RoadLink::Road { id, contact: contact(link)?, line })),
         other => {
             Err(link.wrong(format!("unknown `elementType` `{other}`; `road` or `junction` is expected")))
         }
@@ -312,41 +445,6 @@ fn contact(element: Element) -> Result<Contact, RoadError> {
             Err(element.wrong(format!("unknown `contactPoint` `{other}`; `start` or `end` is expected")))
         }
     }
-}
-
-fn junction(junction: Element) -> Result<JunctionElement, RoadError> {
-    let connections = junction.children("connection").map(|connection| {
-        let links = connection.children("laneLink");
-        Ok(ConnectionElement {
-            line: connection.line(),
-            incoming_road: connection.text("incomingRoad")?.to_owned(),
-            connecting_road: match connection.attribute("connectingRoad") {
-                Some(road) => road.to_owned(),
-                // A direct junction (1.7) links two roads without a connecting road.
-                None => connection.text("linkedRoad")?.to_owned(),
-            },
-            contact: contact(connection)?,
-            lane_links: links
-                .map(|link| Ok((link.integer("from")?, link.integer("to")?)))
-                .collect::<Result<_, _>>()?,
-        })
-    });
-    let controllers = junction.children("controller");
-    Ok(JunctionElement {
-        line: junction.line(),
-        id: junction.text("id")?.to_owned(),
-        name: junction.attribute("name").unwrap_or("").to_owned(),
-        connections: connections.collect::<Result<_, _>>()?,
-        priorities: junction
-            .children("priority")
-            .filter_map(|entry| {
-                Some((entry.attribute("high")?.to_owned(), entry.attribute("low")?.to_owned()))
-            })
-            .collect(),
-        controllers: controllers
-            .map(|entry| Ok((entry.text("id")?.to_owned(), entry.line())))
-            .collect::<Result<_, _>>()?,
-    })
 }
 
 fn controller(controller: Element) -> Result<ControllerElement, RoadError> {

@@ -6,6 +6,9 @@ use super::super::elements::{ObjectElement, ObjectKind, Outline};
 use super::super::xml::Element;
 use super::{ROAD_M_MAX, Reader};
 
+/// An object that begins so high above the road is in nobody's way, m.
+const ABOVE_M: f64 = 3.0;
+
 /// Limit on the copies of one crosswalk.
 const REPEATS_MAX: f64 = 1000.0;
 
@@ -59,12 +62,25 @@ impl Reader {
             ObjectKind::Solid => object.attribute("id").unwrap_or(""),
         };
         let (s_m, t_m) = (object.number("s")?, object.number_or("t", 0.0)?);
+        // Crowns of trees and arms of lamps are above, whatever their outlines are.
+        let is_on_the_ground = !matches!(word, "gantry" | "tree" | "vegetation" | "streetLamp")
+            && object.number_or("zOffset", 0.0)? < ABOVE_M;
         if kind == ObjectKind::Solid
             && let Some(corners) = stretched(object, s_m, t_m)?
         {
             self.count_corners(object, corners.len())?;
             let (outline, heading_rad) = (Outline::Road(corners), 0.0);
-            return Ok(vec![ObjectElement { id: id.to_owned(), kind, s_m, t_m, heading_rad, outline }]);
+            let (id, word) = (id.to_owned(), word.to_owned());
+            return Ok(vec![ObjectElement {
+                id,
+                word,
+                kind,
+                is_on_the_ground,
+                s_m,
+                t_m,
+                heading_rad,
+                outline,
+            }]);
         }
         let Some(outline) = outline(object)? else {
             match kind {
@@ -75,13 +91,18 @@ impl Reader {
             }
             return Ok(Vec::new());
         };
+        if object.child("outlines").is_some_and(|outlines| outlines.children("outline").nth(1).is_some()) {
+            self.ignore("outlines of objects after the first".to_owned());
+        }
         let heading_rad = object.number_or("hdg", 0.0)?;
         let places = self.repeats(object, s_m, t_m)?;
         let (Outline::Local(corners) | Outline::Road(corners)) = &outline;
         self.count_corners(object, places.len().saturating_mul(corners.len()))?;
         let copies = places.into_iter().map(|(moved_m, t_m)| ObjectElement {
             id: id.to_owned(),
+            word: word.to_owned(),
             kind,
+            is_on_the_ground,
             s_m: s_m + moved_m,
             t_m,
             heading_rad,

@@ -92,19 +92,26 @@ fn national(country: &str, kind: &str, subtype: &str) -> Option<SignKind> {
         "CZ" | "CZE" => lettered(&number, subtype, "P6", "P4", "P2"),
         "SE" | "SWE" => lettered(&number, subtype, "B2", "B1", "B4"),
         "CH" | "CHE" => lettered(&number, subtype, "3.01", "3.02", "3.03"),
-        _ => match number.as_str() {
-            "206" | "R11" => Some(SignKind::Stop),
-            "205" | "R12" => Some(SignKind::Yield),
-            // Priority at the next junction, and until further notice.
-            "301" | "306" => Some(SignKind::PriorityRoad),
-            _ => None,
-        },
+        "AT" | "AUT" => lettered(&number, subtype, "5224", "5223", "5225A"),
+        "PT" | "PRT" => lettered(&number, subtype, "B2", "B1", "B3"),
+        "DK" | "DNK" => lettered(&number, subtype, "B13", "B11", "B16"),
+        // Norway's 206 is the priority road, and no stop sign.
+        "NO" | "NOR" => lettered(&number, subtype, "204", "202", "206"),
+        "RU" | "RUS" => lettered(&number, subtype, "2.5", "2.4", "2.1"),
+        // Neither Canada nor Australia has a sign for a priority road.
+        "CA" | "CAN" => lettered(&number, subtype, "RA1", "RA2", "-"),
+        _ => lettered(&number, subtype, "206", "205", "306")
+            // Priority at the next junction only.
+            .or_else(|| lettered(&number, subtype, "R11", "R12", "301")),
     }
 }
 
 /// A sign whose whole number stands in `type`, or its letters there and the rest in `subtype`.
 fn lettered(number: &str, subtype: &str, stop: &str, yields: &str, priority: &str) -> Option<SignKind> {
-    let whole = format!("{number}{}", subtype.to_ascii_uppercase());
+    // -1 stands for no subtype.
+    let subtype = if subtype == "-1" { "" } else { subtype };
+    let rest = subtype.chars().filter(char::is_ascii_alphanumeric).map(|letter| letter.to_ascii_uppercase());
+    let whole: String = number.chars().chain(rest).collect();
     let is = |sign: &str| number == sign || whole == sign;
     [(stop, SignKind::Stop), (yields, SignKind::Yield), (priority, SignKind::PriorityRoad)]
         .into_iter()
