@@ -343,6 +343,11 @@ class Runs(unittest.TestCase):
             with self.assertRaisesRegex(ValueError, "it has no table `episodes`: there are `episode`"):
                 avastra.engine.read_table(out / "run.db", "episodes")
 
+    def test_what_recurs_is_what_every_command_says(self):
+        self.assertEqual([avastra.recurs(count, 20) for count in (14, 15)], [False, True])
+        with self.assertRaises(ValueError):
+            avastra.recurs(3, 2)
+
     def test_what_is_no_run_is_refused(self):
         with tempfile.TemporaryDirectory() as folder:
             with self.assertRaisesRegex(ValueError, "run.db"):
