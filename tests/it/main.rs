@@ -43,6 +43,7 @@ mod scaling_maps;
 mod shards;
 mod studies;
 mod suites;
+mod sureness;
 mod surveys;
 mod tables;
 mod told;
