@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from .engine import compile as compile
     from .engine import episode_seed as episode_seed
     from .engine import read_run as read_run
+    from .engine import recurs as recurs
     from .engine import step_all as step_all
     from .engine import variables as variables
     from .notebook import Run as Run
@@ -55,7 +56,7 @@ __version__ = "0.1.0"
 
 _ENGINE = [
     "ENGINE", "EpisodeError", "Episodes", "Snapshot", "Space", "SpaceError", "Variable", "compile", "episode_seed",
-    "read_run", "step_all", "variables",
+    "read_run", "recurs", "step_all", "variables",
 ]
 _NOTEBOOK = ["Run", "Scenario", "runs"]
 

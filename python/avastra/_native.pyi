@@ -202,6 +202,11 @@ def step_all(
     ends and infos, one each.
     """
 
+def recurs(recurred: int, replays: int) -> bool:
+    """Whether a finding recurs that happened again in `recurred` of its `replays` under other noise: the 95 % interval of
+    the share lies above one half. Every command and page decides so; the columns are `recurred` and `replays` of
+    `collision`. Where the driving system is not deterministic, the share mixes its chance with the noise."""
+
 def episode_seed(seed: int, number: int) -> int:
     """The seed of the nth episode of a run of a seed, from 0 and through its roads one after another."""
 

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 try:
     from ._native import (ENGINE, EpisodeError, Episodes, Snapshot, Space, SpaceError, Variable, episode_seed,
-                          read_table, step_all, variables)
+                          read_table, recurs, step_all, variables)
 except ImportError as error:
     raise ImportError("the engine of avastra is not built: `pip install ./python` in its repository does it, "
                       "and needs Rust") from error
 
 __all__ = [
     "ENGINE", "EpisodeError", "Episodes", "Snapshot", "Space", "SpaceError", "Variable", "compile", "episode_seed",
-    "read_run", "step_all", "variables",
+    "read_run", "recurs", "step_all", "variables",
 ]
 
 _Path = Union[str, "os.PathLike[str]"]

@@ -26,6 +26,7 @@ Needs `gymnasium>=1.2.2,<2`: `pip install './python[gym]'`.
 """
 
 import copy
+import operator
 import os
 from typing import Any, Dict, List, Literal, Mapping, Optional, Sequence, Tuple, Union
 
@@ -98,7 +99,7 @@ class Env(gymnasium.Env[Observation, np.int64]):
         if options:
             raise ValueError(f"no option `{next(iter(options))}`: `reset` takes `seed` alone")
         super().reset(seed=seed)
-        seed = _drawn(self.np_random) if seed is None else int(seed)
+        seed = _drawn(self.np_random) if seed is None else _whole(seed, "seed")
         observation, self._legal = self.episodes.reset(seed)
         return self._shown(observation), {"seed": seed, "action_mask": self._legal.copy()}
 
@@ -123,8 +124,9 @@ class Env(gymnasium.Env[Observation, np.int64]):
 
         Raises:
             EpisodeError: There is no such row, or the episode has ended: `reset` begins the next one.
+            TypeError: The action is no whole number.
         """
-        observation, reward, end, info = self.episodes.step(int(action))
+        observation, reward, end, info = self.episodes.step(_whole(action, "action"))
         # What the caller does with its info is not done to what is legal.
         self._legal = info["action_mask"].copy()
         terminated = _is_terminal(end)
@@ -212,7 +214,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
             if which.shape != (self.num_envs,) or not which.any():
                 raise ValueError(f"`reset_mask` has {self.num_envs} values, at least one of them true")
         if seed is None or isinstance(seed, (int, np.integer)):
-            seed = [None if seed is None else int(seed) + world for world in range(self.num_envs)]
+            seed = [None if seed is None else _whole(seed, "seed") + world for world in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise ValueError(f"{self.num_envs} worlds need as many seeds")
         infos = self._begin(np.flatnonzero(which), seed, {})
@@ -233,13 +235,14 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
             EpisodeError: There is no such row, or in the mode `DISABLED` an episode has ended. No world has moved then, and
                 the next episodes are those that they would have been. In `SAME_STEP` also if an external driving system
                 fails as the next episode begins: all worlds have moved then.
+            TypeError: An action is no whole number. No world has moved then.
         """
         begin: List[int] = np.flatnonzero(self._has_ended).tolist()
         if self.autoreset_mode == AutoresetMode.DISABLED and begin:
             raise EpisodeError(f"the episodes of worlds {begin} have ended: reset them with `reset_mask`")
         drawn, generators = self._draw(begin)
         seeds = [drawn.get(world) for world in range(self.num_envs)]
-        rows = [int(action) for action in actions]
+        rows = [_whole(action, "action") for action in actions]
         observations, legal, rewards, ends, found = step_all(self.worlds, rows, seeds, self.threads)
         self._generators.update(generators)
         self._observations, self._legal = observations, legal
@@ -266,7 +269,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
 
     def _begin(self, worlds: np.ndarray, seeds: Sequence[Optional[int]], infos: Dict[str, Any]) -> Dict[str, Any]:
         """Begins the next episodes of some worlds and adds their infos. A seed also begins a world's own sequence of seeds."""
-        given = {world: int(seed) for world, seed in enumerate(seeds) if seed is not None}
+        given = {world: _whole(seed, "seed") for world, seed in enumerate(seeds) if seed is not None}
         own, generators = self._draw([world for world in worlds.tolist() if world not in given])
         generators.update({world: seeding.np_random(given[world])[0] for world in worlds.tolist() if world in given})
         drawn = [given[world] if world in given else own[world] for world in worlds.tolist()]
@@ -346,6 +349,16 @@ def _with_mask(observation: np.ndarray, legal: np.ndarray) -> Dict[str, np.ndarr
 def _with_whole_seed(info: Mapping[str, Any]) -> Dict[str, Any]:
     # Gymnasium gathers Python's integers as int64, which half of the seeds of a run exceed.
     return {**info, "seed": np.uint64(info["seed"])}
+
+
+def _whole(value: Any, what: str) -> int:
+    """A whole number as it is. `int` would cut a share off, and would read a text."""
+    if not isinstance(value, (bool, np.bool_)):
+        try:
+            return operator.index(value)
+        except TypeError:
+            pass
+    raise TypeError(f"{what} must be a whole number, and is {value!r}")
 
 
 def _is_terminal(end: Optional[str]) -> bool:

@@ -1,6 +1,6 @@
 //! The settings of episodes that a command line asks for: who drives, where, under which conditions.
 
-use avastra_campaign::run::{RunSettings, TrafficRecord};
+use avastra_campaign::run::{Profile, RunSettings, TrafficRecord};
 use avastra_lang::model::Space;
 
 use super::arguments::ConditionArguments;
@@ -28,6 +28,13 @@ pub fn settings(
         with: arguments.rules.with.clone(),
         ..RunSettings::new(space, agent, episodes, arguments.seed)
     })
+}
+
+/// What the profile of the driving system changes, for a heading; nothing if it is the default. The settings have it, so a
+/// command that goes on says it, too.
+pub fn profile_text(profile: Option<&Profile>) -> String {
+    let line = profile.map(|profile| profile.settings.to_line());
+    line.filter(|line| !line.is_empty()).map_or_else(String::new, |line| format!(" with {line}"))
 }
 
 /// The roads that a command line names, or all of the space.

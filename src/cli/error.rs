@@ -18,8 +18,12 @@ pub enum Failure {
     Unformatted { files: usize },
     #[error("{count} refuted", count = super::output::plural(*claims, "claim"))]
     Refuted { claims: usize },
-    #[error("{count} found", count = super::output::plural(*collisions, "counted collision"))]
-    Collision { collisions: usize },
+    #[error("{count} found{recurring}", count = super::output::plural(*collisions, "counted collision"))]
+    Collision {
+        collisions: usize,
+        /// How many of them recur, in words, if that was tried.
+        recurring: String,
+    },
     #[error("requirements were breached in {count}", count = super::output::plural(*episodes, "episode"))]
     Breach { episodes: usize },
     /// A driving system of one's own is not the one that was begun with.

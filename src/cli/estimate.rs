@@ -7,17 +7,18 @@ use std::sync::atomic::AtomicBool;
 use avastra_base::statistics::Interval;
 use avastra_campaign::estimate::{
     Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
-    Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, compared, pilot,
-    play_parts,
+    FRAME, Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, compared,
+    pilot, play_parts,
 };
 use avastra_campaign::run::{DatabaseError, Run, RunSettings, Shard, Units};
 use avastra_world::action::ActionTable;
 
 use super::arguments::EstimateArguments;
 use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, as_they_are, missing};
+use super::conditions::profile_text;
 use super::error::Failure;
 use super::files::{remove, write};
-use super::findings::is_reproducible;
+use super::findings::{is_reproducible, thinking_text};
 use super::interrupt::stop_on_interrupt;
 use super::output::{Output, for_shell, plural};
 use super::parallel::jobs;
@@ -152,6 +153,13 @@ fn play_all(
     let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
     write(&path.join("results.json"), &format!("{text}\n"))?;
     output.say(&estimate_text(&results, is_unfinished, share.shard));
+    if !results.missed_goals.is_empty() {
+        output.warn(&format!(
+            "the estimate missed its goals: {}; more parts come nearer (`--parts`)",
+            results.missed_goals.join("; ")
+        ));
+    }
+    thinking_text(estimate.run().arena().program()).iter().for_each(|text| output.say(text));
     let critical = directory.critical(output)?;
     output.say(&critical_text(&path, &critical, &[]));
     let is_reproducible = is_reproducible(output, estimate.run().arena().program());
@@ -439,11 +447,12 @@ fn heading(estimate: &Estimate) -> String {
         Method::Probe => "by trying rows out",
     };
     format!(
-        "{}: how often {} under {} against {}, {method}, {} of {} on {}, seed {}",
+        "{}: how often {} under {} against {}{}, {method}, {} of {} on {}, seed {}",
         estimate.run().space().path.display(),
         settings.event.in_words(),
         settings.run.agent,
         estimate.run().arena().ads_name(),
+        profile_text(settings.run.profile.as_ref()),
         plural(settings.parts as usize, "part"),
         plural(settings.run.episodes as usize, "episode"),
         settings.run.roads.join(", "),
@@ -478,6 +487,7 @@ fn estimate_text(results: &EstimateResults, is_unfinished: bool, shard: Shard) -
         }
         _ => {}
     }
+    text.push_str(&format!("{FRAME}\n"));
     if let Some(all) = &results.together {
         if let Some(events) = all.effective_events {
             text.push_str(&format!("events met: as good as {events:.1} of one weight\n"));

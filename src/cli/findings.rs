@@ -7,7 +7,7 @@ use std::sync::Arc;
 use avastra_campaign::run::{FailureCount, Stage};
 use avastra_drivers::Selected;
 use avastra_drivers::external::message::EXTREME_MPS2;
-use avastra_drivers::external::{FailureKind, Program};
+use avastra_drivers::external::{ExternalSettings, FailureKind, Program, Thinking};
 
 use super::error::Failure;
 use super::load;
@@ -47,6 +47,27 @@ pub fn is_reproducible(output: &Output, program: Option<&Arc<Program>>) -> bool 
     let doubts: Vec<String> = loose.into_iter().chain(otherwise).chain(missed).collect();
     doubts.iter().for_each(|doubt| output.warn(doubt));
     doubts.is_empty()
+}
+
+/// How long the driving system thought about its answers, if it was asked.
+pub fn thinking_text(program: Option<&Arc<Program>>) -> Option<String> {
+    let program = program?;
+    let Thinking { answers, median_s, most_of_99_s, most_s, beyond_period, late } = program.thinking()?;
+    let ms = |time_s: f64| format!("{:.1} ms", 1000.0 * time_s);
+    let ExternalSettings { period_s, timeouts, .. } = program.settings();
+    let late = match late {
+        0 => String::new(),
+        late => format!("; {late} came after the limit of {} s and were waited for", timeouts.step_s),
+    };
+    Some(format!(
+        "the driving system thought {} at the median, {} in 99 of 100 of {}, {} at most; {:.1} % took longer than the \
+         period of {period_s} s{late}",
+        ms(median_s),
+        ms(most_of_99_s),
+        plural(answers as usize, "answer"),
+        ms(most_s),
+        100.0 * beyond_period,
+    ))
 }
 
 /// A note on answers that asked for more than any vehicle can do, if there were any.

@@ -1,29 +1,44 @@
-//! Ctrl-C: the first ends a command after the episodes under way, if it can be gone on with; otherwise, and the second
-//! time, all ends at once, external driving systems included.
+//! Ctrl-C and SIGTERM: the first ends a command after the episodes under way, if it can be gone on with; otherwise, and the
+//! second time, all ends at once, external driving systems included.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use avastra_drivers::external;
+use nix::sys::signal::{SigSet, Signal};
 
 use super::output::remark;
 
 /// The flag of a command that ends in good order.
 static STOP: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
-/// Listens for Ctrl-C.
+/// Listens for Ctrl-C, and for SIGTERM, by which schedulers, containers and `timeout` end a command.
 pub fn listen() {
-    let heard = ctrlc::set_handler(|| match STOP.get() {
+    // Every later thread inherits that it does not receive SIGTERM, so the one that waits for it does. What is started does
+    // not inherit it: the standard library clears the mask of a child.
+    let mut terminate = SigSet::empty();
+    terminate.add(Signal::SIGTERM);
+    if terminate.thread_block().is_ok() {
+        std::thread::spawn(move || {
+            while terminate.wait().is_ok() {
+                stop(143);
+            }
+        });
+    }
+    if let Err(error) = ctrlc::set_handler(|| stop(130)) {
+        remark(&format!("warning: cannot listen for Ctrl-C: {error}"));
+    }
+}
+
+fn stop(status: i32) {
+    match STOP.get() {
         Some(stop) if !stop.swap(true, Ordering::Relaxed) => {
-            remark("finishing the episodes under way; press again to leave them");
+            remark("finishing the episodes under way; a second signal leaves them");
         }
         _ => {
             external::end_all();
-            std::process::exit(130);
+            std::process::exit(status);
         }
-    });
-    if let Err(error) = heard {
-        remark(&format!("warning: cannot listen for Ctrl-C: {error}"));
     }
 }
 

@@ -25,8 +25,8 @@ pub fn write_both(directory: &Path, space: &Path, tests: &[ProtocolTest]) -> Res
     Ok([table, cases])
 }
 
-/// The counts, and the tests if they are few; otherwise those that failed, as far as there is room.
-pub fn in_words(tests: &[ProtocolTest]) -> String {
+/// How the tests ended: `167 avoided, 3 mitigated`.
+pub fn counts_text(tests: &[ProtocolTest]) -> String {
     let tally = Tally::of(tests);
     let mut counts: Vec<String> = Ending::ALL
         .iter()
@@ -38,7 +38,15 @@ pub fn in_words(tests: &[ProtocolTest]) -> String {
     if not_played > 0 {
         counts.push(format!("{not_played} without an action"));
     }
-    let mut text = format!("\nprotocol: {}", counts.join(", "));
+    if tally.breached > 0 {
+        counts.push(format!("{} with a breach", tally.breached));
+    }
+    counts.join(", ")
+}
+
+/// The counts, and the tests if they are few; otherwise those that failed, as far as there is room.
+pub fn in_words(tests: &[ProtocolTest]) -> String {
+    let mut text = format!("\nprotocol: {}", counts_text(tests));
     let shown: Vec<&ProtocolTest> = match tests.len() <= LISTED_MAX {
         true => tests.iter().collect(),
         false => tests.iter().filter(|test| test.is_failed() || test.ending.is_none()).collect(),
@@ -59,8 +67,12 @@ fn ended(test: &ProtocolTest) -> String {
         return test.refused.as_ref().map_or("nothing happened".to_owned(), |why| format!("refused: {why}"));
     };
     let mut text = ending.in_words().to_owned();
+    // An ego vehicle that stands is still hit at the speed of the other.
+    if let Some(relative) = test.relative_mps {
+        let _ = write!(text, " at {} against each other", kmh(relative));
+    }
     if let (Some(impact), Some(lost)) = (test.impact_mps, test.reduction_mps()) {
-        let _ = write!(text, " at {}, {} less than before", kmh(impact), kmh(lost));
+        let _ = write!(text, ", the ego vehicle at {}, {} less than before", kmh(impact), kmh(lost));
     }
     if let Some(precrash) = &test.precrash {
         let _ = write!(text, ": {precrash}");
@@ -195,6 +207,17 @@ mod tests {
             cases.contains("18.0 km/h less than before: 24 lead vehicle moving at lower constant speed; breached: keeps_gap"),
             "{cases}"
         );
-        assert!(in_words(&tests).contains("1 mitigated, 1 without an action"));
+        assert!(in_words(&tests).contains("1 mitigated, 1 without an action, 2 with a breach"));
+        // An ego vehicle that stands, and is hit at 70 km/h, is not hit at 0 km/h.
+        let [mut stands, _] = tests;
+        (stands.impact_mps, stands.before_mps, stands.relative_mps) =
+            (Some(0.0), Some(70.0 / 3.6), Some(70.0 / 3.6));
+        assert!(
+            ended(&stands).starts_with(
+                "mitigated at 70.0 km/h against each other, the ego vehicle at 0.0 km/h, 70.0 km/h less than before"
+            ),
+            "{}",
+            ended(&stands)
+        );
     }
 }

@@ -170,20 +170,28 @@ fn play(
     let severities: Vec<oracle::Severity> = log.collisions.iter().map(oracle::severity).collect();
     let priorities: Vec<&str> =
         log.collisions.iter().map(|collision| collision.contact.ruling.priority.name()).collect();
-    let started = ads.program().filter(|program| program.can_start()).map(|program| program.attached());
-    let doubted = started.filter(|attached| !attached.is_deterministic()).map(|attached| attached.name());
+    let program = ads.program().filter(|program| program.can_start());
     let claims = other.is_none().then(|| {
         let mut claims = stage.verify(ads, &log);
+        let Some(program) = program.filter(|_| claims.iter().any(oracle::ClaimResult::is_refuted)) else {
+            return claims;
+        };
+        // One that says it is deterministic may not be: it is asked once more before the claims are blamed.
+        if let Some(first) = &log.conversation {
+            program.spot_check(first, || stage.play(ads, &mut |_, _, _| {}).conversation);
+        }
+        if program.is_deterministic() {
+            return claims;
+        }
         for claim in claims.iter_mut().filter(|claim| claim.is_refuted()) {
-            // What says that it may answer otherwise cannot refute a claim by doing so.
-            if let Some(name) = &doubted {
-                claim.confirmed = None;
-                claim.found =
-                    format!("{} this time, but {name} says that it is not deterministic", claim.found);
-            }
+            // What may answer otherwise cannot refute a claim by doing so.
+            let name = program.attached().name();
+            claim.confirmed = None;
+            claim.found = format!("{} this time, but {name} is not deterministic", claim.found);
         }
         claims
     });
+    let doubted = program.filter(|program| !program.is_deterministic());
     let judgements = other.is_some().then(|| stage.judge(ads, &log));
     let counted =
         judgements.as_ref().map(|judgements| oracle::counted(table.space(), &log, judgements).len());

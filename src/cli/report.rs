@@ -26,7 +26,7 @@ use super::output::{Output, for_shell, plural};
 use super::parallel::{PerFile, each_file};
 use super::replay::refutation;
 use super::study::Sound;
-use super::{estimate, run_directory, shrink, study};
+use super::{estimate, protocol, run_directory, shrink, study};
 
 /// Name of the page in a directory.
 const NAME: &str = "report.html";
@@ -281,6 +281,9 @@ fn of_run(
     let heat = maps(asked, &tests, is_protocol)?;
     let (table, results) = (table.as_ref(), results.as_ref());
     found.overview = report::of_run(&database, table, settings, results, &heat).map_err(unread)?;
+    if is_protocol {
+        found.overview["protocol"] = Value::from(protocol::counts_text(&tests));
+    }
     let groups = database.groups().map_err(unread)?;
     let name = |road: &str, episode: i64| format!("{road}_{episode:04}");
     found.examples = groups.iter().map(|group| name(&group.road, group.episode)).collect();

@@ -140,7 +140,7 @@ pub fn review(
     if claims(|claim| matches!(claim, Claim::Minimal { .. })) {
         let judgements: Vec<_> = summary.collisions.iter().map(|found| found.judgement.clone()).collect();
         for found in summary.collisions.iter_mut().filter(|found| found.counted) {
-            found.minimal = oracle::spare_steps(&setup, &log, found.number, &judgements).is_empty();
+            found.minimal = oracle::spare_steps(&setup, &log, found.number, &judgements, replays).is_empty();
         }
     }
     let source = emit::Provenance {

@@ -8,10 +8,12 @@ use std::sync::atomic::Ordering;
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::oracle;
+use avastra_campaign::oracle::MIXED;
 use avastra_campaign::run::{
-    Database, DatabaseError, EpisodeSummary, FoundIn, Group, Numbered, PolicyReference, RefusalCount,
-    RequirementCount, Run, RunSettings, Totals, play,
+    DEFAULT_ADS, Database, DatabaseError, EpisodeSummary, FoundIn, Group, Numbered, PolicyReference,
+    RefusalCount, RequirementCount, Run, RunSettings, Totals, TrafficRecord, play,
 };
+use avastra_drivers::ModularConfig;
 use avastra_drivers::external::{Conversation, Problem};
 use avastra_lang::model::Policy;
 use avastra_search::agent::{Face, Kind, by_name};
@@ -19,9 +21,10 @@ use avastra_world::action::{ActionTable, Draw};
 
 use super::arguments::RunArguments;
 use super::campaign::{self, Campaign, Cut, Item, Outside, Share, settled};
+use super::conditions::profile_text;
 use super::error::Failure;
 use super::files::write_answers;
-use super::findings::{cut_off, failures_text, is_reproducible};
+use super::findings::{cut_off, failures_text, is_reproducible, thinking_text};
 use super::interrupt::stop_on_interrupt;
 use super::never::Never;
 use super::output::{Output, for_shell, plural};
@@ -34,8 +37,14 @@ use super::{compile, conditions, load, merge, protocol, run_directory, shard};
 /// Episodes on each road if nobody asks for more or less.
 const EPISODES: u32 = 100;
 
+/// Episodes that a program which says it is deterministic is asked a second time: one alone may come out alike by chance.
+const SPOT_CHECKS: usize = 3;
+
 /// Largest number of critical scenarios, groups and refusal reasons that the summary lists.
 const NAMED_MAX: usize = 10;
+
+/// A run with its directory, and how its policy was trained otherwise, in words.
+type Begun = ((Run, Directory), Option<String>);
 
 type Directory = run_directory::Directory<RunSettings>;
 
@@ -68,8 +77,8 @@ impl Cut for RunSettings {
     }
 
     fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
-        let (run, directory) = resumed(output, directory, true)?;
-        play_all(output, run, directory, None).map(drop)
+        let (begun, _) = resumed(output, directory, true)?;
+        play_all(output, begun, None, None).map(drop)
     }
 }
 
@@ -79,11 +88,16 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
         Some(path) => Some(resumed(output, path, false)?),
         None => begun(output, arguments)?,
     };
-    let Some((run, directory)) = begun else { return Ok(()) };
-    output.tell(&format!("{}, into {}", heading(&run, arguments), directory.path.display()));
-    let found = play_all(output, run, directory, arguments.jobs)?;
+    let Some(((run, directory), elsewhere)) = begun else { return Ok(()) };
+    output.tell(&format!("{}, into {}", heading(&run), directory.path.display()));
+    elsewhere.iter().for_each(|text| output.warn(text));
+    let found = play_all(output, (run, directory), elsewhere, arguments.jobs)?;
     if arguments.fail_on_collision && found.counted > 0 {
-        return Err(Failure::Collision { collisions: found.counted as usize });
+        let recurring = match found.replayed {
+            0 => String::new(),
+            _ => format!(", {} of them recur under other noise", found.counted_recurring),
+        };
+        return Err(Failure::Collision { collisions: found.counted as usize, recurring });
     }
     if arguments.fail_on_breach && found.episodes_with_breach > 0 {
         return Err(Failure::Breach { episodes: found.episodes_with_breach as usize });
@@ -96,10 +110,11 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
 }
 
 /// Plays the episodes that a directory still lacks, and says what all of them came to.
+/// `elsewhere` says how a policy was trained otherwise.
 fn play_all(
     output: &Output,
-    run: Run,
-    mut directory: Directory,
+    (run, mut directory): (Run, Directory),
+    elsewhere: Option<String>,
     asked_jobs: Option<u32>,
 ) -> Result<Totals, Failure> {
     let program = run.arena().program();
@@ -114,7 +129,7 @@ fn play_all(
     let started = now();
     let jobs = jobs(asked_jobs, program)?;
     let mut progress = share.progress(output, "counted", &todo);
-    let mut driven: Option<(usize, Arc<Conversation>)> = None;
+    let mut driven: Vec<(usize, Arc<Conversation>)> = Vec::new();
     play(&run, &todo, jobs, &stop, &mut |summary, log| {
         // An episode that was not driven is not kept, so that `--resume` plays it.
         if log.failure.as_ref().is_some_and(|failure| failure.problem == Problem::GivenUp) {
@@ -123,8 +138,8 @@ fn play_all(
         }
         keep(&run, &mut directory, &summary, &log)?;
         progress.episode(summary.counted());
-        if driven.is_none() && log.failure.is_none() {
-            driven = log.conversation.clone().map(|conversation| (summary.episode, conversation));
+        if driven.len() < SPOT_CHECKS && log.failure.is_none() {
+            driven.extend(log.conversation.clone().map(|conversation| (summary.episode, conversation)));
         }
         Ok::<_, Failure>(())
     })?;
@@ -134,16 +149,24 @@ fn play_all(
         directory = settled(run.settings(), directory)?;
     }
 
+    // Before anything is said of what recurs: a program that is not deterministic mixes its chance with the noise.
+    for (number, first) in driven.iter().filter(|_| !stop.load(Ordering::Relaxed)) {
+        program.iter().for_each(|program| {
+            program.spot_check(first, || run.episode(*number).conversation);
+        });
+    }
+
     let totals = directory.read(Database::totals)?;
     let refusals = directory.read(Database::refusals)?;
-    output.say(&totals_text(&totals, started.elapsed().as_secs_f64(), todo.len()));
+    let is_mixed = program.is_some_and(|program| !program.is_deterministic());
+    output.say(&totals_text(&totals, started.elapsed().as_secs_f64(), todo.len(), is_mixed));
     if !refusals.is_empty() {
         output.say(&refusals_text(&refusals));
     }
     let groups = directory.read(Database::groups)?;
     let found = directory.read(Database::found)?;
     if !groups.is_empty() {
-        output.say(&groups_text(&groups, &found));
+        output.say(&groups_text(&groups));
     }
     let requirements = directory.read(Database::requirements)?;
     if !requirements.is_empty() {
@@ -179,29 +202,27 @@ fn play_all(
             directory.path.display()
         ));
     }
+    if critical.is_empty() && kept.is_empty() && is_over && !is_protocol {
+        output.say("next: `--keep 3` keeps the nearest misses to look at; more episodes or other roads (`--road`) may find more");
+    }
     let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {
         let place = format!("; each is in {}/failures", directory.path.display());
         output.say(&failures_text(&failures, &place));
     }
-    if let Some(program) = program
-        && let Some((number, first)) = driven
-        && !stop.load(Ordering::Relaxed)
-    {
-        program.spot_check(&first, || run.episode(number).conversation);
-    }
+    thinking_text(program).iter().for_each(|text| output.say(text));
     let is_reproducible = is_reproducible(output, program);
     cut_off(program).iter().for_each(|note| output.warn(note));
     output.result(serde_json::json!({
-        "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups,
-        "requirements": requirements, "never": never, "critical": critical, "found": found, "kept": kept, "failures": failures, "tests": tests, "tables": tables, "reproducible": is_reproducible,
+        "directory": directory.path, "trained_elsewhere": elsewhere, "totals": totals, "refusals": refusals, "groups": groups,
+        "requirements": requirements, "never": never, "critical": critical, "found": found, "kept": kept, "failures": failures, "thinking": program.and_then(|program| program.thinking()), "tests": tests, "tables": tables, "reproducible": is_reproducible,
     }));
     share.end(output, directory, is_over, program)?;
     Ok(totals)
 }
 
 /// A new run in a directory of its own; for a dry run only says what would be played.
-fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<(Run, Directory)>, Failure> {
+fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<Begun>, Failure> {
     let (out, face) = (arguments.out.as_deref(), arguments.face);
     // With its own table.
     let policy = arguments.policy.as_ref().map(|path| load::policy(output, path)).transpose()?;
@@ -226,7 +247,7 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<(Run, Direc
     let settings = settings.started_unless(arguments.shard.dry_run);
     let run = ready(table, settings, policy.as_ref(), face)?;
     if arguments.shard.dry_run {
-        let texts = (&*heading(&run, arguments), &*plural(run.episodes(), "episode"));
+        let texts = (&*heading(&run), &*plural(run.episodes(), "episode"));
         return shard::planned(output, out, run.settings(), texts, shard).map(|()| None);
     }
     let (held, copy) = run_directory::create(out, shard, &run.space().path, arguments.self_contained)?;
@@ -245,11 +266,12 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<(Run, Direc
     };
     let settings = RunSettings { policy: reference, ..run.settings().clone() };
     let directory = Directory::begin(held, settings, &run.space().path, run.arena().attached())?;
-    Ok(Some((run, directory)))
+    let elsewhere = policy.as_ref().and_then(|(_, policy)| trained_elsewhere(policy, &run));
+    Ok(Some(((run, directory), elsewhere)))
 }
 
 /// The rest of an interrupted run. With `is_played`, nothing of it is left to play, and no program is started.
-fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Run, Directory), Failure> {
+fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<Begun, Failure> {
     let resumed = run_directory::resume::<RunSettings>(output, path, is_played)?;
     let Resumed { settings, text, table, held } = resumed;
     let policy = match &settings.policy {
@@ -267,6 +289,7 @@ fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Run, Direct
     };
     let face = settings.policy.as_ref().map_or(Face::Network, |reference| reference.face);
     let run = ready(table, settings, policy.as_ref(), face)?;
+    let elsewhere = policy.as_ref().and_then(|(_, policy)| trained_elsewhere(policy, &run));
     let directory = Directory::open_to_go_on(output, held, &text)?;
     if !is_played {
         for (episode, path) in directory.restore(output)? {
@@ -276,7 +299,7 @@ fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Run, Direct
             }
         }
     }
-    Ok((run, directory))
+    Ok(((run, directory), elsewhere))
 }
 
 /// A run of the agent that the settings name, or of the given policy, whose table must have the same rows.
@@ -342,31 +365,64 @@ fn keep_near(run: &Run, directory: &Directory) -> Result<Vec<PathBuf>, Failure> 
         .collect()
 }
 
-fn heading(run: &Run, arguments: &RunArguments) -> String {
+/// Says of a policy that plays where, or against whom, it has not learned, how it was trained.
+fn trained_elsewhere(policy: &Policy, run: &Run) -> Option<String> {
+    let (origin, settings) = (&policy.origin, run.settings());
+    let mut told = Vec::new();
+    let roads: Vec<&str> =
+        settings.roads.iter().filter(|road| !origin.roads.contains(road)).map(String::as_str).collect();
+    if !roads.is_empty() {
+        told.push(format!("on {}, and plays on {}", origin.roads.join(", "), roads.join(", ")));
+    }
+    // A profile that is not recorded is the default.
+    let usual = || (origin.ads == DEFAULT_ADS).then(|| ModularConfig::default().digest());
+    let trained = origin.profile_digest.clone().or_else(usual);
+    let profile = settings.profile.as_ref().map(|profile| profile.digest.clone());
+    let now = run.arena().attached().map(|attached| attached.digest()).or(profile).or_else(usual);
+    if settings.ads != origin.ads {
+        told.push(format!("against {}, and plays against {}", origin.ads, run.arena().ads_name()));
+    } else if trained != now {
+        let how =
+            |line: Option<&str>| line.map_or("its default profile".to_owned(), |line| format!("`{line}`"));
+        let line = settings.profile.as_ref().map(|profile| profile.settings.to_line());
+        let line =
+            line.filter(|line| !line.is_empty()).or_else(|| run.arena().attached().map(|of| of.to_line()));
+        let (before, after) = (how(origin.profile.as_deref()), how(line.as_deref()));
+        told.push(format!("against {} with {before}, and plays against it with {after}", origin.ads));
+    }
+    let traffic = settings.traffic.as_ref().map(TrafficRecord::in_words);
+    if traffic != origin.traffic {
+        let usual = || "the usual".to_owned();
+        let (before, after) = (origin.traffic.clone().unwrap_or_else(usual), traffic.unwrap_or_else(usual));
+        told.push(format!("with traffic {before}, and plays with {after}"));
+    }
+    (!told.is_empty()).then(|| {
+        format!("`{}` was trained {}: what it learned need not hold there", policy.name, told.join("; "))
+    })
+}
+
+fn heading(run: &Run) -> String {
     let settings = run.settings();
     let ambient = match settings.ambient {
         0 => String::new(),
         wanted => format!(", {} of ambient traffic", plural(wanted as usize, "vehicle")),
     };
-    let traffic = settings.traffic.as_ref().map_or(String::new(), |record| {
-        let name = arguments.conditions.traffic.as_deref().or(record.settings.shipped_as());
-        format!(", traffic {}", name.unwrap_or("of a profile of its own"))
-    });
+    let traffic =
+        settings.traffic.as_ref().map_or(String::new(), |record| format!(", traffic {}", record.in_words()));
     let ads = run.arena().ads_name();
-    let profile = load::profile_path(&arguments.under_test.ads)
-        .map_or(String::new(), |path| format!(" with {}", path.display()));
     format!(
-        "{}: {} against {}{profile}, {} on {}{ambient}{traffic}, seed {}",
+        "{}: {} against {}{}, {} on {}{ambient}{traffic}, seed {}",
         run.space().path.display(),
         settings.agent,
         ads,
+        profile_text(settings.profile.as_ref()),
         plural(if settings.rows > 0 { run.episodes() } else { settings.episodes as usize }, "episode"),
         settings.roads.join(", "),
         settings.seed
     )
 }
 
-fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
+fn totals_text(totals: &Totals, elapsed_s: f64, played: usize, is_mixed: bool) -> String {
     let ends = [
         (totals.arrived, "at the goal"),
         (totals.stalled, "stalled"),
@@ -399,13 +455,23 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
     }
     if totals.replayed > 0 {
         text.push_str(&format!(
-            "\nagain in more than half of the replays under other noise: {} of {}",
+            "\n{} of {} recur under other noise (their 95 % interval lies above one half)",
             totals.recurring,
             plural(totals.replayed as usize, "finding")
         ));
+        if is_mixed {
+            text.push_str(&format!("; {MIXED}"));
+        }
     }
     if totals.red_runs > 0 {
         text.push_str(&format!("\n{} passed", plural(totals.red_runs as usize, "red light")));
+    }
+    if totals.red_unkept > 0 {
+        text.push_str(&format!(
+            "; {} of these kept as no scenario, because nothing of the space asks about red lights: `law.ava` has a \
+             requirement that does",
+            plural(totals.red_unkept as usize, "episode")
+        ));
     }
     if totals.collisions > 0 {
         text.push_str("\nan episode goes on after a collision, if the ego vehicle can");
@@ -433,9 +499,9 @@ fn refusals_text(refusals: &[RefusalCount]) -> String {
     cut_short(head, refusals, line, |more| format!("and for {more} other reasons"))
 }
 
-/// Distinct failures by pre-crash type, each with how often it was found and a scenario that shows it, how often that recurs,
-/// and what happened there.
-pub fn groups_text(groups: &[Group], found: &[FoundIn]) -> String {
+/// Distinct failures by pre-crash type, each with how often it was found, a scenario that shows it, how often its collision
+/// recurs, and what happened there.
+pub fn groups_text(groups: &[Group]) -> String {
     let line = |group: &Group| {
         let cause = match group.cause.as_deref() {
             None => String::new(),
@@ -447,8 +513,14 @@ pub fn groups_text(groups: &[Group], found: &[FoundIn]) -> String {
             "other" => ", the other first",
             _ => "",
         };
-        let example = found.iter().find(|of| of.episode == group.episode);
-        let again = example.and_then(|of| of.recurrence).map_or(String::new(), |again| format!(", {again}"));
+        let again = match group.recurrence {
+            None => ", not played again".to_owned(),
+            Some(of) if group.count == 1 => format!(" {}", of.in_words(false)),
+            Some(of) => {
+                let Group { recurring, tried, .. } = group;
+                format!(" {}; {recurring} of {tried} that were played again recur", of.in_words(false))
+            }
+        };
         let number = group.precrash_number.map_or(String::new(), |number| format!("{number} "));
         let Group { count, precrash, kind, manoeuvre, approach, side, shape, road, episode, .. } = group;
         format!(
@@ -456,7 +528,12 @@ pub fn groups_text(groups: &[Group], found: &[FoundIn]) -> String {
              by the {side} ({shape})"
         )
     };
-    let head = format!("{} (NHTSA's pre-crash types):", plural(groups.len(), "distinct failure"));
+    let counted: usize = groups.iter().map(|group| group.count).sum();
+    let head = format!(
+        "{} (NHTSA's pre-crash types) among {}:",
+        plural(groups.len(), "distinct failure"),
+        plural(counted, "counted collision")
+    );
     cut_short(head, groups, line, |more| format!("and {more} others"))
 }
 
@@ -518,16 +595,7 @@ pub fn critical_text(directory: &Path, files: &[PathBuf], found: &[FoundIn]) -> 
     let by_name: BTreeMap<String, &FoundIn> = found.iter().map(|of| (of.name(), of)).collect();
     let line = |file: &PathBuf| {
         let of = file.file_stem().and_then(|stem| by_name.get(&*stem.to_string_lossy()));
-        let recurrence = of.and_then(|of| of.recurrence);
-        let told = [
-            recurrence.map(|recurrence| match recurrence.is_fluke() {
-                true => format!("a fluke: recurs in {recurrence}"),
-                false => format!("recurs in {recurrence}"),
-            }),
-            of.and_then(|of| of.harm.clone()),
-        ];
-        let told: Vec<String> = told.into_iter().flatten().collect();
-        let told = if told.is_empty() { String::new() } else { format!("  {}", told.join(", ")) };
+        let told = of.map_or_else(String::new, |of| format!("  {}", of.in_words()));
         format!("{}{told}", file.display())
     };
     let head = format!("\n{} with a counted collision or a breach:", plural(files.len(), "scenario"));

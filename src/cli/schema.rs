@@ -114,9 +114,10 @@ completions
 run
   PLANNED
   directory text the run directory
-  totals object sums over all episodes: how they ended, collisions by kind
+  trained_elsewhere text? of `--policy`: on which other road, or against which other driving system, profile or traffic, it was trained
+  totals object sums over all episodes: how they ended; `collisions`, those `counted` and their kinds; findings that were played again (`replayed`), those that recur (`recurring`) and the counted collisions among these (`counted_recurring`); `red_runs`, and episodes with one in which nothing was found (`red_unkept`)
   refusals[] object a reason why actions were refused: `reason` and `times`
-  groups[] object a distinct failure: its type among NHTSA's pre-crash types (`precrash`, `precrash_number`), the modules at fault, `count`, an episode that shows it, what happened there
+  groups[] object a distinct failure: its type among NHTSA's pre-crash types (`precrash`, `precrash_number`), the modules at fault, `count`, how many were played again (`tried`) and recur (`recurring`), an episode that shows it with its own `recurrence`, what happened there
   never.rows number rows of the table
   never.steps number steps of all episodes, in each of which every row is offered
   never.legal[] object a row that no step allowed; what `refused` it, and how often
@@ -124,9 +125,10 @@ run
   never.realised[] object a row that was chosen, but never carried out
   requirements[] object a requirement in force: for how long it was asked (`asked_s`, `asked_in` episodes), `breaches`, `breached_in`, `tried_in` and `kept_in` (episodes with a breach; of these, those that careful drivers drove, and that one kept), the `smallest` margin in its `unit`, the `nearest` episode, a `scenario` with the worst breach of those that were written
   critical[] text scenarios with a counted collision or a breach, the surest and worst first
-  found[] object an episode with a finding: `road`, `episode`, whether it has a counted collision or a breach (`critical`), the `recurrence` (`recurred` of `replays`) of the finding that recurs most often, the `harm` of its worst collision
+  found[] object an episode with a finding: `road`, `episode`, whether it has a counted collision or a breach (`critical`), what the rest is about (`finding`: `collision` or a requirement; one that recurs comes first), its `recurrence` (`recurred` of `replays`), its `harm`
   tests[] object of `every-row`: an action that was carried out, or that was refused (why is `refused`; without an `ending`): `episode`, `road`, `action`, its `values`, its `ending` (`avoided`, `near`, `mitigated`, `hit`), speeds before and at the first contact (m/s) and its `precrash` type, the least `ttc_s`, whether a collision is `counted`, what was `breached`
   tables[] text of `every-row`: the same as CSV and as JUnit XML
+  thinking object? of a driving system of your own that was asked: `answers`, seconds by the wall clock (`median_s`, `most_of_99_s`, `most_s`), the share `beyond_period`, how many were `late`
   kept[] text with `--keep`: paths of episodes without a finding, the nearest misses first
   failures[] object what went wrong with a driving system of your own: `kind`, `problem`, `times`, `detail`, `scenario`
   REPRODUCIBLE
@@ -166,6 +168,7 @@ estimate
   results.method text `count` or `probe`
   results.parts number parts that are done
   results.parts_wanted number all parts, if it does not stop before
+  results.missed_goals[] text of `--precision` and `--hours`, what was wanted and what was reached
   results.missing number share of such estimates whose intervals miss the truth, at most
   results.missing_at_look number the same of one look; those of all looks share it
   results.roads[] object `road`, with the fields of `results.together` for it
@@ -240,12 +243,14 @@ shrink
   median_steps number
   median_actions number
   kept number scenarios that keep their verdict and every claim
-  scenarios[] object `file`, `output`, steps and actions before and after, claims `refuted`
+  scenarios[] object `file`, `output`, steps and actions before and after, what was kept and traded (`worth_before`, `worth`), claims `refuted`
   REPRODUCIBLE
   FAILED
 test
   still_fails number scenarios with the same crash
-  fixed number scenarios without one
+  fixed number scenarios without one, by the driving system that they were found with
+  passed number scenarios without one, by another driving system, or by one that is not deterministic in all of its plays
+  recorded number scenarios that were played from recorded answers: no program was asked
   changed number scenarios with another crash, that never meet the obstacle, or whose crash a review finds gone
   errors number scenarios that could not be played
   ads_failed number scenarios in which an external driving system failed
@@ -255,8 +260,11 @@ test
   REPRODUCIBLE
   scenarios[].file text
   scenarios[].scenario text its name
-  scenarios[].outcome text `still fails`, `fixed`, `changed`, `gone`, `ads failed`, `error`
+  scenarios[].outcome text `still fails`, `fixed`, `passed`, `changed`, `gone`, `ads failed`, `error`
   scenarios[].reason text may be empty
+  scenarios[].recorded bool from recorded answers: no program was asked
+  scenarios[].found_with text? the driving system that found it, if it is another than the one under test
+  scenarios[].plays number 1; more where the driving system is not deterministic
 report
   page text its path
   scenarios number on the page

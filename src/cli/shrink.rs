@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use avastra_campaign::emit;
 use avastra_campaign::episode::{Outcome, Script, Setup};
-use avastra_campaign::oracle::{self, Found};
+use avastra_campaign::oracle::{self, Found, MIXED, Worth};
 use avastra_campaign::run::{self, Asked, EpisodeSummary, Stage};
 use avastra_drivers::Selected;
 use avastra_lang::model::Claim;
@@ -45,6 +45,7 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
     let done = &shrunk.done;
     for small in done {
         output.tell(&small.in_words());
+        output.tell(&format!("  {}", small.worth_in_words()));
         if shrunk.is_single() {
             small.actions_left.iter().for_each(|action| output.tell(&format!("  {action}")));
         }
@@ -84,6 +85,10 @@ struct Small {
     after: (usize, usize),
     /// The actions that are left.
     actions_left: Vec<String>,
+    /// What was kept and what was traded, before and after.
+    worth: [Worth; 2],
+    /// Whether the driving system need not repeat itself.
+    is_mixed: bool,
     plays: u32,
     /// Claims of the written file that do not hold.
     refuted: usize,
@@ -102,8 +107,42 @@ impl Small {
         )
     }
 
+    /// What is the same as before, and what is not quite.
+    fn worth_in_words(&self) -> String {
+        let [before, after] = &self.worth;
+        let first = |priority: &str| match priority {
+            "none" => "no priority".to_owned(),
+            "ego" => "ego first".to_owned(),
+            _ => "the other first".to_owned(),
+        };
+        let harm = after.harm.map(|harm| format!("{harm} harm"));
+        let kept = [after.kind.map(str::to_owned), harm, after.priority.map(first)];
+        let kept: Vec<String> = kept.into_iter().flatten().collect();
+        let kept = (!kept.is_empty()).then(|| format!("kept: {}", kept.join(", ")));
+        let moved = |what: &str, unit: &str, pair: Option<(f64, f64)>| {
+            pair.map(|(before, after)| format!("{what} {before:.1} → {after:.1}{unit}"))
+        };
+        let kmh = |of: &Worth| of.impact_mps.map(|mps| 3.6 * mps);
+        let again = match (before.recurrence, after.recurrence) {
+            (Some(before), Some(after)) => {
+                let mixed = if self.is_mixed { format!("; {MIXED}") } else { String::new() };
+                format!("recurs in {before} → {after}{mixed}")
+            }
+            _ => "how often it recurs was not tried, because the file does not claim it".to_owned(),
+        };
+        let told = [
+            kept,
+            moved("impact", " km/h", kmh(before).zip(kmh(after))),
+            moved("margin", "", before.margin.zip(after.margin)),
+            Some(again),
+        ];
+        told.into_iter().flatten().collect::<Vec<_>>().join("; ")
+    }
+
     fn in_json(&self) -> serde_json::Value {
+        let [before, after] = &self.worth;
         serde_json::json!({
+            "worth_before": before, "worth": after,
             "file": self.file, "output": self.path, "scenario": self.scenario,
             "steps_before": self.before.0, "actions_before": self.before.1,
             "steps": self.after.0, "actions": self.after.1,
@@ -137,10 +176,18 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
     let (log, judgements, found) = stage.first_found(&ads);
     let Some(found) = found else {
         let name = &scenario.name;
-        let message = format!("`{name}` has no counted collision and no claimed breach that could be kept");
+        let message = match ads.program().filter(|program| !program.is_deterministic()) {
+            None => format!("`{name}` has no counted collision and no claimed breach that could be kept"),
+            Some(program) => format!(
+                "`{name}` has no counted collision and no claimed breach in this play: {} is not deterministic, so \
+                 another play may have one",
+                program.attached().name()
+            ),
+        };
         return Err(Failure::usage(message));
     };
-    let shrunk = oracle::shrink(&stage.setup(&ads), &log, found, &judgements);
+    let replays = scenario.replays();
+    let shrunk = oracle::shrink(&stage.setup(&ads), &log, found, &judgements, replays);
 
     let path = named.map_or_else(|| apart(file), |path| Ok(path.clone()))?;
     let path = path.as_path();
@@ -159,12 +206,14 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
     };
     let setup = Setup { start: shrunk.start, memory: shrunk.memory, ..stage.setup(&ads) };
     let spare = match shrunk.found {
-        Found::Collision(index) => oracle::spare_steps(&setup, &shrunk.log, index, &shrunk.judgements),
+        Found::Collision(index) => {
+            oracle::spare_steps(&setup, &shrunk.log, index, &shrunk.judgements, replays)
+        }
         Found::Breach(_) => Vec::new(),
     };
     let mut summary = EpisodeSummary::new(table.space(), source.episode, &shrunk.log, shrunk.judgements);
     summary.find_keepers(&setup, &shrunk.log);
-    summary.find_recurrence(&setup, &shrunk.script, &shrunk.log, scenario.replays());
+    summary.find_recurrence(&setup, &shrunk.script, &shrunk.log, replays);
     if let Found::Collision(index) = shrunk.found {
         summary.collisions[index].minimal = spare.is_empty();
     }
@@ -175,6 +224,17 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
         avastra_lang::syntax::print(&emit::scenario(&table, (&shrunk.log, &summary), shrunk.found, &source));
     write_result(named, path, &text)?;
     write_answers(path, &shrunk.log)?;
+    let recurrence = match shrunk.found {
+        Found::Collision(index) => summary.collisions[index].recurrence,
+        Found::Breach(index) => {
+            let of = shrunk.log.breaches[index].requirement;
+            summary.breached.iter().find(|found| found.requirement == of).and_then(|found| found.recurrence)
+        }
+    };
+    let worth = [
+        Worth::new(&log, found, shrunk.recurrence_before),
+        Worth::new(&shrunk.log, shrunk.found, recurrence),
+    ];
     let actions = shrunk.log.steps.iter().filter_map(|step| match &step.outcome {
         Outcome::Done { draw, .. } => Some(emit::action_text(&table, draw)),
         Outcome::Passed | Outcome::Refused { .. } => None,
@@ -186,6 +246,8 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
         before: size(&Script::of_log(&log)),
         after: size(&shrunk.script),
         actions_left: actions.collect(),
+        worth,
+        is_mixed: ads.program().is_some_and(|program| !program.is_deterministic()),
         plays: shrunk.plays,
         refuted: refuted(output, path, &ads)?,
     })

@@ -1,20 +1,23 @@
 //! `avastra test`: emitted scenarios as a regression suite for a driving system.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use avastra_base::statistics::proportion;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::files;
 use avastra_campaign::oracle::{self, Regression};
 use avastra_campaign::run::{self, Asked, RunError, Stage};
 use avastra_drivers::external::{Failure as AdsFailure, FailureKind};
+use avastra_drivers::{EXTERNAL, Selected};
 use avastra_lang::check::{Loaded, normal};
 use avastra_lang::model::{Claim, Scenario};
 use avastra_lang::syntax::ast::FileId;
 use avastra_lang::syntax::{Diagnostic, Sources};
 use avastra_world::action::ActionTable;
 
-use super::arguments::{FilesArguments, TestArguments};
+use super::arguments::{FilesArguments, REPLAYS, TestArguments};
 use super::error::Failure;
 use super::files::{without_links, write, write_named};
 use super::findings::{is_reproducible, spot_check};
@@ -33,7 +36,19 @@ struct Case {
     scenario: String,
     road: String,
     outcome: Outcome,
+    by: By,
     elapsed_s: f64,
+}
+
+/// By what a scenario was played.
+#[derive(Debug, Clone, Default)]
+struct By {
+    /// From recorded answers: no program was asked.
+    is_recorded: bool,
+    /// Names of the driving system that it was found with, and of the one that played it, if these differ.
+    other: Option<(String, String)>,
+    /// Plays with the driving system under test, if that need not repeat itself.
+    loose_plays: Option<u32>,
 }
 
 enum Outcome {
@@ -87,6 +102,18 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         return Err(Failure::usage(format!("no scenario in `{named}`")));
     }
     tell_outdated(output, &outdated);
+    let driven = cases.iter().filter(|case| {
+        matches!(&case.outcome, Outcome::Played(found) | Outcome::Allowed(found)
+            if !matches!(found, Regression::AdsFailed(_) | Regression::FailsAgain(_)))
+    });
+    let program = suite.asked.external.as_ref();
+    spot_check(program, driven.map(|case| case.file.as_path()));
+    // It may say that it is deterministic, and be found to be otherwise just now.
+    if program.is_some_and(|program| !program.is_deterministic()) {
+        for case in &mut cases {
+            case.by.loose_plays.get_or_insert(1);
+        }
+    }
     if let Some(path) = &arguments.junit {
         // A folder that is misspelt is not made.
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -95,36 +122,56 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         }
         write_named(path, &junit(&named, &cases))?;
     }
-    let count = |word: &str| cases.iter().filter(|case| case.outcome.in_words().0 == word).count();
+    let count = |word: &str| cases.iter().filter(|case| case.in_words().0 == word).count();
     let (fails, fixed, ads_failed, errors) =
         (count("still fails"), count("fixed"), count("ads failed"), count("error"));
+    let passed = count(PASSED);
+    let recorded = cases.iter().filter(|case| case.by.is_recorded).count();
     let changed = count("changed") + count("gone");
     if arguments.accept {
         output.say(&format!("{} written anew", plural(accepted, "scenario")));
     }
     output.say(&format!(
-        "{}: {fails} still fail, {fixed} fixed, {changed} changed, {errors} not played",
-        plural(cases.len(), "scenario")
+        "{}: {fails} still fail, {fixed} fixed, {}{changed} changed, {errors} not played",
+        plural(cases.len(), "scenario"),
+        if passed > 0 { format!("{passed} {PASSED}, ") } else { String::new() },
     ));
-    let driven = cases.iter().filter(|case| {
-        matches!(&case.outcome, Outcome::Played(found) | Outcome::Allowed(found)
-            if !matches!(found, Regression::AdsFailed(_) | Regression::FailsAgain(_)))
-    });
-    spot_check(suite.asked.external.as_ref(), driven.map(|case| case.file.as_path()));
-    let is_reproducible = is_reproducible(output, suite.asked.external.as_ref());
+    if recorded > 0 {
+        output.warn(&format!(
+            "{} of {}: played from recorded answers, and no program was asked; that says nothing of the program as it is \
+             now, which `--ads` gives",
+            recorded,
+            plural(cases.len(), "scenario")
+        ));
+    }
+    let others = cases.iter().filter_map(|case| case.by.other.as_ref());
+    let found_with: BTreeSet<&str> = others.clone().map(|(found, _)| found.as_str()).collect();
+    if !found_with.is_empty() {
+        let found_with: Vec<String> = found_with.into_iter().map(|name| format!("`{name}`")).collect();
+        output.warn(&format!(
+            "{} of {}: found with another driving system ({}), so that the one under test passes does not say that \
+             anything was mended",
+            others.count(),
+            plural(cases.len(), "scenario"),
+            found_with.join(", ")
+        ));
+    }
+    let is_reproducible = is_reproducible(output, program);
     if ads_failed > 0 {
         output.say(&format!("in {ads_failed} more the driving system itself failed"));
     }
     let listed: Vec<serde_json::Value> = cases
         .iter()
         .map(|case| {
-            let (outcome, reason) = case.outcome.in_words();
+            let (outcome, reason) = case.in_words();
             serde_json::json!({ "file": case.file, "scenario": case.scenario,
-                                "outcome": outcome, "reason": reason })
+                                "outcome": outcome, "reason": reason, "recorded": case.by.is_recorded,
+                                "found_with": case.by.other.as_ref().map(|(found, _)| found),
+                                "plays": case.by.loose_plays.unwrap_or(1) })
         })
         .collect();
     output.result(
-        serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed, "errors": errors, "ads_failed": ads_failed, "reproducible": is_reproducible,
+        serde_json::json!({ "still_fails": fails, "fixed": fixed, "passed": passed, "recorded": recorded, "changed": changed, "errors": errors, "ads_failed": ads_failed, "reproducible": is_reproducible,
                                       "accepted": accepted, "reviewed": reviewed, "scenarios": listed }),
     );
     if errors > 0 {
@@ -141,7 +188,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
 fn tell(output: &Output, (case, notes): &(Case, Notes)) {
     notes.told.iter().for_each(|(sources, diagnostics)| output.diagnostics(sources, diagnostics));
     notes.said.iter().for_each(|line| output.say(line));
-    let (word, reason) = case.outcome.in_words();
+    let (word, reason) = case.in_words();
     let reason = if reason.is_empty() { String::new() } else { format!(": {reason}") };
     output.tell(&format!("{word:<12}{}{reason}", case.file.display()));
 }
@@ -209,23 +256,65 @@ impl Suite<'_> {
         let started = now();
         let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let mut notes = Notes::default();
-        let (scenario, road, outcome) = match self.open(file, &mut notes) {
+        let (scenario, road, outcome, by) = match self.open(file, &mut notes) {
             Ok((Emitted::Policy(..), _)) => return None,
             Ok((Emitted::Scenario(table, scenario), reviewed)) => {
                 let road = table.space().roads[scenario.road].name.clone();
                 let not_played =
                     |error: RunError| Outcome::NotPlayed { reason: error.to_string(), in_source: false };
                 let compared = || self.compare(&table, &scenario).unwrap_or_else(not_played);
-                let outcome = reviewed.unwrap_or_else(compared);
-                (scenario.name, road, outcome)
+                let mut by = self.by(&scenario);
+                let outcome = match (reviewed, &mut by.loose_plays) {
+                    (Some(reviewed), _) => reviewed,
+                    (None, None) => compared(),
+                    (None, Some(plays)) => self.until_it_fails(&scenario, plays, compared),
+                };
+                (scenario.name, road, outcome, by)
             }
             Err(failure) => {
                 let in_source = matches!(failure, Failure::Source { .. } | Failure::Outdated);
-                (name, String::new(), Outcome::NotPlayed { reason: failure.to_string(), in_source })
+                let outcome = Outcome::NotPlayed { reason: failure.to_string(), in_source };
+                (name, String::new(), outcome, By::default())
             }
         };
         let elapsed_s = started.elapsed().as_secs_f64();
-        Some((Case { file: file.to_owned(), scenario, road, outcome, elapsed_s }, notes))
+        Some((Case { file: file.to_owned(), scenario, road, outcome, by, elapsed_s }, notes))
+    }
+
+    /// By what a scenario is played.
+    fn by(&self, scenario: &Scenario) -> By {
+        let name = |ads: &Selected| match ads.program() {
+            // Its version is meant to change.
+            Some(program) => program.attached().title(),
+            None => ads.name().to_owned(),
+        };
+        let played = self.asked.selected_for(scenario).ok().map(|(ads, _)| name(&ads));
+        let found = run::found_with(scenario);
+        let program = self.asked.external.as_ref();
+        By {
+            is_recorded: self.asked.is_nothing() && scenario.origin.ads.as_deref() == Some(EXTERNAL),
+            other: Some(found).zip(played).filter(|(found, played)| found != played),
+            loose_plays: program.filter(|program| !program.is_deterministic()).map(|_| 1),
+        }
+    }
+
+    /// Plays a scenario with a driving system that need not repeat itself until it fails, as often as a finding is played
+    /// again. `plays` is how often it was.
+    fn until_it_fails(
+        &self,
+        scenario: &Scenario,
+        plays: &mut u32,
+        compared: impl Fn() -> Outcome,
+    ) -> Outcome {
+        let most = if scenario.replays() > 0 { scenario.replays() } else { REPLAYS };
+        let mut outcome = compared();
+        while *plays < most && !outcome.is_failure() && !matches!(outcome, Outcome::NotPlayed { .. }) {
+            // Otherwise it would be taken at its first word.
+            self.asked.external.iter().for_each(|program| program.forget());
+            *plays += 1;
+            outcome = compared();
+        }
+        outcome
     }
 
     /// Reads a file. One whose space has changed is noted, or reviewed; then it may be known already what comes of it.
@@ -392,7 +481,48 @@ fn claimed_failure(scenario: &Scenario) -> Option<FailureKind> {
     FailureKind::ALL.into_iter().find(|kind| kind.name() == end)
 }
 
+/// What is said where nothing failed, but where it cannot be said that anything was mended.
+const PASSED: &str = "passed";
+
+impl Case {
+    /// One of seven words, and why.
+    fn in_words(&self) -> (&'static str, String) {
+        let (word, reason) = self.outcome.in_words();
+        let By { is_recorded, other, loose_plays } = &self.by;
+        let is_fixed = matches!(self.outcome, Outcome::Played(Regression::Fixed));
+        let word = match is_fixed {
+            true if *is_recorded => "changed",
+            true if other.is_some() || loose_plays.is_some() => PASSED,
+            _ => word,
+        };
+        let found_with = other.as_ref().filter(|_| word == PASSED);
+        let loosely = loose_plays.map(|plays| match word {
+            PASSED => {
+                let (_, [_, most]) = proportion(0, plays);
+                format!(
+                    "in {plays} of {} of a driving system that is not deterministic: it may still fail in up to {:.0} %",
+                    plural(plays as usize, "play"),
+                    100.0 * most
+                )
+            }
+            _ => format!("in play {plays} of a driving system that is not deterministic"),
+        });
+        let played = self.outcome.was_played();
+        let more = [
+            (!reason.is_empty()).then_some(reason),
+            found_with.map(|(found, _)| format!("found with `{found}`")),
+            loosely.filter(|_| played),
+            (*is_recorded && played).then(|| "by its recorded answers, no program was asked".to_owned()),
+        ];
+        (word, more.into_iter().flatten().collect::<Vec<_>>().join("; "))
+    }
+}
+
 impl Outcome {
+    fn was_played(&self) -> bool {
+        !matches!(self, Outcome::Gone(_) | Outcome::NotPlayed { .. })
+    }
+
     /// Whether the driving system still crashes, or is itself what fails.
     fn is_failure(&self) -> bool {
         match self {
@@ -458,7 +588,7 @@ fn junit(suite: &str, cases: &[Case]) -> String {
          <testsuite name=\"{name}\" {counts}>\n"
     );
     for case in cases {
-        let (word, reason) = case.outcome.in_words();
+        let (word, reason) = case.in_words();
         let reason = escaped(&reason);
         let element = match &case.outcome {
             Outcome::NotPlayed { .. } => Some("error"),
@@ -466,9 +596,11 @@ fn junit(suite: &str, cases: &[Case]) -> String {
             outcome if outcome.is_skipped() => Some("skipped"),
             Outcome::Played(_) | Outcome::Breached { .. } | Outcome::Allowed(_) | Outcome::Gone(_) => None,
         };
-        let inside = element.map_or_else(String::new, |element| {
-            format!("\n      <{element} type=\"{word}\" message=\"{reason}\"/>\n    ")
-        });
+        let inside = match element {
+            Some(element) => format!("\n      <{element} type=\"{word}\" message=\"{reason}\"/>\n    "),
+            None if reason.is_empty() => String::new(),
+            None => format!("\n      <system-out>{word}: {reason}</system-out>\n    "),
+        };
         let is_alone = cases.iter().filter(|other| other.scenario == case.scenario).count() == 1;
         let name = if is_alone {
             case.scenario.clone()
@@ -516,6 +648,7 @@ mod tests {
             scenario: scenario.to_owned(),
             road: "corner".to_owned(),
             outcome,
+            by: By::default(),
             elapsed_s: 0.25,
         };
         let cases = [

@@ -1,14 +1,14 @@
 //! `avastra train`: trains an agent to find crashes, and writes it as a policy.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use avastra_campaign::emit;
 use avastra_campaign::episode::{Breach, Script};
 use avastra_campaign::oracle;
-use avastra_campaign::run::{
-    Database, EpisodeSummary, Group, RunSettings, Shard, Stage, TrafficRecord, Units,
-};
+use avastra_campaign::oracle::MIXED;
+use avastra_campaign::run::{Database, EpisodeSummary, RunSettings, Shard, Stage, TrafficRecord, Units};
 use avastra_campaign::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
 use avastra_drivers::external::Attached;
 use avastra_lang::model::policy::{PolicyClaims, PolicyOrigin};
@@ -19,10 +19,10 @@ use avastra_world::action::Draw;
 
 use super::arguments::{REPLAYS, TrainArguments};
 use super::campaign::{self, Campaign, Outside, as_they_are};
-use super::conditions::roads_or_all;
+use super::conditions::{profile_text, roads_or_all};
 use super::error::Failure;
 use super::files::{folder, write};
-use super::findings::{cut_off, failures_text, is_reproducible, kinds_text, unfinished};
+use super::findings::{cut_off, failures_text, is_reproducible, kinds_text, thinking_text, unfinished};
 use super::interrupt::stop_on_interrupt;
 use super::load::UnderTest;
 use super::output::{Output, for_shell, plural};
@@ -216,11 +216,13 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
         plural(evaluation.counted as usize, "collision"),
         plural(evaluation.colliding as usize, "episode"),
     ));
+    find_recurrence(output, training, &mut directory)?;
     let groups = directory.read(Database::groups)?;
-    find_recurrence(output, training, &mut directory, &groups)?;
-    let found = directory.read(Database::found)?;
     if !groups.is_empty() {
-        output.say(&groups_text(&groups, &found));
+        output.say(&groups_text(&groups));
+        if training.arena().program().is_some_and(|program| !program.is_deterministic()) {
+            output.say(&format!("of how often they recur: {MIXED}"));
+        }
     }
     let requirements = directory.read(Database::requirements)?;
     if !requirements.is_empty() {
@@ -256,6 +258,7 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
             plural(all, "episode"),
         ));
     }
+    thinking_text(training.arena().program()).iter().for_each(|text| output.say(text));
     let is_reproducible = is_reproducible(output, training.arena().program());
     cut_off(training.arena().program()).iter().for_each(|note| output.warn(note));
     let evaluation = serde_json::json!({
@@ -280,39 +283,35 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
     if failed > 0 && failed == all { Err(Failure::Ads { findings: failed }) } else { Ok(()) }
 }
 
-/// Says of the example of each distinct failure, and of each requirement, how often it recurs, in its scenario and in the database. A training finds
-/// the same failure over and over, so one of each is played again and not all.
-fn find_recurrence(
-    output: &Output,
-    training: &Training,
-    directory: &mut Directory,
-    groups: &[Group],
-) -> Result<(), Failure> {
+/// Says of examples of each distinct failure, and of each requirement, how often they recur, in their scenarios and in the
+/// database. A training finds the same failure over and over, so not all are played again, but one after the other until one
+/// recurs: only a failure of which all were tried may be called one that does not.
+fn find_recurrence(output: &Output, training: &Training, directory: &mut Directory) -> Result<(), Failure> {
     let TrainSettings { agent, without, with, .. } = training.settings();
     let player = Player { command: "train", table: training.table(), agent, without, with };
-    let known = directory.read(Database::found)?;
-    let is_known = |episode| known.iter().any(|found| found.episode == episode && found.recurrence.is_some());
-    let written = directory.read(Units::scenarios)?;
-    let breaches = directory.read(Database::first_breaches)?;
-    let all = groups.iter().map(|group| group.episode).chain(breaches.into_values());
-    let examples: Vec<i64> = all.filter(|&one| !is_known(one)).collect();
-    let examples = written.into_iter().filter(|one| examples.contains(&one.unit));
-    let files = run_directory::written(&directory.path, examples.collect());
-    if files.is_empty() || !oracle::can_replay(training.arena().ads()) {
-        return Ok(());
-    }
     let _working = Working::new(output, "playing what it found again");
-    // What is edited or gone is the user's.
-    for (path, _) in files.iter().filter(|file| !run_directory::is_edited(file) && file.0.is_file()) {
-        let (table, scenario) = load::scenario(&Output::silent(), path)?;
-        let (stage, ads) = (Stage::new(&table, &scenario)?, training.arena().ads());
-        let (setup, log) = (stage.setup(ads), stage.play(ads, &mut |_, _, _| {}));
-        let episode = scenario.origin.episode.unwrap_or(0) as usize;
-        let mut summary = EpisodeSummary::judged(&setup, episode, &log);
-        summary.find_keepers(&setup, &log);
-        summary.find_recurrence(&setup, &Script::of_scenario(&scenario), &log, REPLAYS);
-        let text = directory.write_critical(&player, (&log, &summary))?;
-        directory.write(|database| database.add_recurrence(&summary, table.space(), &text))?;
+    let mut done = BTreeSet::new();
+    while oracle::can_replay(training.arena().ads()) {
+        let next = directory.read(|database| database.to_try(|episode| done.contains(&episode)))?;
+        if next.is_empty() {
+            break;
+        }
+        let written = directory.read(Units::scenarios)?;
+        let examples = written.into_iter().filter(|one| next.contains(&one.unit));
+        let files = run_directory::written(&directory.path, examples.collect());
+        done.extend(next);
+        // What is edited or gone is the user's.
+        for (path, _) in files.iter().filter(|file| !run_directory::is_edited(file) && file.0.is_file()) {
+            let (table, scenario) = load::scenario(&Output::silent(), path)?;
+            let (stage, ads) = (Stage::new(&table, &scenario)?, training.arena().ads());
+            let (setup, log) = (stage.setup(ads), stage.play(ads, &mut |_, _, _| {}));
+            let episode = scenario.origin.episode.unwrap_or(0) as usize;
+            let mut summary = EpisodeSummary::judged(&setup, episode, &log);
+            summary.find_keepers(&setup, &log);
+            summary.find_recurrence(&setup, &Script::of_scenario(&scenario), &log, REPLAYS);
+            let text = directory.write_critical(&player, (&log, &summary))?;
+            directory.write(|database| database.add_recurrence(&summary, table.space(), &text))?;
+        }
     }
     Ok(())
 }
@@ -361,6 +360,7 @@ fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Pol
             ads: settings.ads.clone(),
             profile: line.filter(|line| !line.is_empty()).or_else(|| attached.map(Attached::to_line)),
             profile_digest: digest.or_else(|| attached.map(Attached::digest)),
+            traffic: settings.traffic.as_ref().map(TrafficRecord::in_words),
             engine: settings.engine.clone(),
             avastra: settings.avastra.clone(),
             with: settings.with.clone(),
@@ -420,11 +420,12 @@ fn heading(training: &Training, directory: &Path) -> String {
         format!(", network {}, {} parameters", widths.join("-"), network.parameters().len())
     });
     format!(
-        "{}: {} ({}{network}) against {}, {} on {}, seed {}, into {}",
+        "{}: {} ({}{network}) against {}{}, {} on {}, seed {}, into {}",
         training.table().space().path.display(),
         settings.agent,
         settings.hyperparameters.preset(),
         training.arena().ads_name(),
+        profile_text(settings.profile.as_ref()),
         plural(settings.episodes as usize, "episode"),
         settings.roads.join(", "),
         settings.seed,

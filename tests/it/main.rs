@@ -45,6 +45,7 @@ mod shards;
 mod situations;
 mod studies;
 mod suites;
+mod sureness;
 mod surveys;
 mod tables;
 mod told;

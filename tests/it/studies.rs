@@ -426,11 +426,23 @@ fn a_database_of_another_kind_is_refused_by_its_layout() {
     let path = scratch.path().join("run.db");
     Database::open(&path, "").expect("it is new");
     let refused = StudyDatabase::open(&path, "").err().expect("it is not a study's").to_string();
-    assert!(refused.ends_with("this version of avastra reads 1006: begin a new one"), "{refused}");
+    assert_eq!(refused, "it is the database of a run or a training, and one of a study is wanted here");
+    // Readers say what they found, and never advise to discard what another version or command wrote.
+    change(&path, "PRAGMA user_version = 1006");
+    let refused =
+        |table: &str| avastra::run::columns(&path, table).expect_err("it is none of a run").to_string();
+    assert_eq!(
+        refused("episode"),
+        "it is the database of a study, and one of a run or a training is wanted here"
+    );
+    change(&path, "PRAGMA user_version = 14");
+    assert!(refused("episode").contains("the version that wrote it still reads it"));
+    change(&path, &format!("PRAGMA user_version = {}", Database::LAYOUT.version));
+    assert!(refused("offers").starts_with("it has no table `offers`: there are `episode`, `step`, "));
     // A file with tables is not new, though its number says so.
     change(&path, "PRAGMA user_version = 0");
     let refused = Database::open(&path, "").err().expect("it has no number").to_string();
-    assert!(refused.starts_with("it has layout 0, this version of avastra reads "), "{refused}");
+    assert!(refused.starts_with("it has layout 0, and this version of avastra reads "), "{refused}");
 }
 
 #[test]

@@ -26,5 +26,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(space::variables, module)?)?;
     module.add_function(wrap_pyfunction!(step_all::step_all, module)?)?;
     module.add_function(wrap_pyfunction!(episodes::episode_seed, module)?)?;
+    module.add_function(wrap_pyfunction!(tables::recurs, module)?)?;
     module.add_function(wrap_pyfunction!(tables::read_table, module)?)
 }

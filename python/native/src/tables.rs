@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use avastra::oracle::Recurrence;
 use avastra::run::{Values, columns};
 use numpy::{PyArray1, ToPyArray as _};
 use pyo3::exceptions::PyValueError;
@@ -33,4 +34,13 @@ pub fn read_table(py: Python<'_>, file: PathBuf, table: String) -> PyResult<Boun
         arrays.set_item(column.name, array)?;
     }
     Ok(arrays)
+}
+
+/// Whether a finding recurs that happened again in so many of so many replays, as every command and page says it.
+#[pyfunction]
+pub fn recurs(recurred: u32, replays: u32) -> PyResult<bool> {
+    if recurred > replays {
+        return Err(PyValueError::new_err(format!("{recurred} of {replays} replays")));
+    }
+    Ok(Recurrence { recurred, replays }.recurs())
 }

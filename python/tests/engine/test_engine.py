@@ -332,6 +332,22 @@ class Runs(unittest.TestCase):
         self.assertEqual(list(kept), ["only", "episodes", "digest"])
         self.assertEqual((kept["episodes"].tolist(), len(kept["digest"])), ([1], 1))
 
+    def test_what_is_no_table_of_a_run_is_named(self):
+        program = os.environ.get("AVASTRA")
+        if not program:
+            self.skipTest("AVASTRA names no program")
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / "run"
+            command = [program, "run", str(SPACE), "--road", "corner", "--episodes", "1", "--out", str(out)]
+            subprocess.run(command, check=True, capture_output=True)
+            with self.assertRaisesRegex(ValueError, "it has no table `episodes`: there are `episode`"):
+                avastra.engine.read_table(out / "run.db", "episodes")
+
+    def test_what_recurs_is_what_every_command_says(self):
+        self.assertEqual([avastra.recurs(count, 20) for count in (14, 15)], [False, True])
+        with self.assertRaises(ValueError):
+            avastra.recurs(3, 2)
+
     def test_what_is_no_run_is_refused(self):
         with tempfile.TemporaryDirectory() as folder:
             with self.assertRaisesRegex(ValueError, "run.db"):

@@ -228,6 +228,24 @@ class ManyWorlds(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "no option `reset_masks`"):
             avastra.gym.VectorEnv(1, SPACE, "crossroad").reset(options={"reset_masks": [True]})
 
+    def test_what_is_no_whole_number_is_no_row(self):
+        env, worlds = made(), avastra.gym.VectorEnv(2, SPACE, "crossroad")
+        env.reset(seed=1)
+        worlds.reset(seed=1)
+        for wrong in (1.9, "3", 1.0, np.float32(1), None, True, [1]):
+            with self.subTest(wrong=wrong), self.assertRaisesRegex(TypeError, "action must be a whole number"):
+                env.step(wrong)
+            with self.subTest(wrong=wrong), self.assertRaisesRegex(TypeError, "action must be a whole number"):
+                worlds.step([0, wrong])
+        with self.assertRaises(TypeError):
+            worlds.step(np.array([0.5, 1.0]))
+        with self.assertRaises(TypeError):
+            worlds.reset(seed=[1, 1.9])
+        # Nothing has moved, and whole numbers of every kind are rows.
+        for right in (1, np.int64(1), np.uint8(1), np.array(1)):
+            self.assertEqual(env.step(right)[4]["time_s"] % 6.0, 0.0)
+        worlds.step(np.array([0, 1]))
+
     def test_a_driving_system_that_fails_at_once(self):
         with tempfile.TemporaryDirectory() as folder:
             conditions = {"ads_config": failing_profile(folder)}

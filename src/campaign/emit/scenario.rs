@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::episode::{Breach, Collision, EpisodeLog, Outcome};
-use crate::oracle::{Found, Recurrence};
+use crate::oracle::{Found, MIXED, Recurrence};
 use crate::run::{EpisodeSummary, Finding};
 use avastra_base::units::Dimension;
 use avastra_drivers::external;
@@ -324,7 +324,12 @@ fn headline_of(space: &Space, log: &EpisodeLog, summary: &EpisodeSummary, about:
             (what, found.and_then(|found| found.recurrence))
         }
     };
-    let again = |of| format!("{what} It recurs in {of} under other noise.");
+    let program = log.conversation.as_deref().map(|conversation| &conversation.attached);
+    let mixed = match program.is_some_and(|attached| !attached.is_deterministic()) {
+        true => format!("; {MIXED}"),
+        false => String::new(),
+    };
+    let again = |of| format!("{what} It recurs in {of} under other noise{mixed}.");
     recurrence.map_or_else(|| what.clone(), again)
 }
 

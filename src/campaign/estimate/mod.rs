@@ -23,5 +23,5 @@ pub use part::{Event, Met, Part, PartRecord, Played, play_parts};
 pub use plan::{Pilot, Plan};
 pub use probing::pilot;
 pub use ready::Estimate;
-pub use results::{EstimateResults, Found, Mass, Probability, RoadEstimate};
+pub use results::{EstimateResults, FRAME, Found, Mass, Probability, RoadEstimate};
 pub use settings::{EstimateError, EstimateSettings, EventKind, Method, Stopping};

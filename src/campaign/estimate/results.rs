@@ -9,6 +9,10 @@ use avastra_base::statistics::{Interval, binomial_missing, bisect, weighted};
 use crate::estimate::part::{Event, Part, PartRecord};
 use crate::estimate::settings::{EstimateSettings, EventKind, Method};
 
+/// What a rate of an estimate is one of.
+pub const FRAME: &str = "these are rates of the episodes of this space, which searches for trouble, with every road as often as any \
+                         other: no rates on the road";
+
 /// The result of an estimate; written to `results.json`.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct EstimateResults {
@@ -26,6 +30,8 @@ pub struct EstimateResults {
     pub roads: Vec<RoadEstimate>,
     /// All roads together, each as often as any other; `None` until each road has the same parts.
     pub together: Option<Probability>,
+    /// The goals (`--precision`, `--hours`) that were missed though all parts are played, or a limit stopped them, in words.
+    pub missed_goals: Vec<String>,
     /// Where the probability lies, the most of it first; empty for a method that does not keep its events.
     pub mass: Vec<Mass>,
 }
@@ -109,14 +115,23 @@ impl EstimateResults {
         let is_even = by_road.iter().all(|own| numbers(own) == numbers(&by_road[0]) && !own.is_empty());
         let named = roads.iter().zip(&by_road).filter(|(_, own)| !own.is_empty());
         let missing_at_look = settings.missing_at_look();
+        let parts_wanted = settings.parts as usize * roads.len();
         let sample =
             |by_road, pilot_s| Sample { method: settings.method, by_road, pilot_s, missing: missing_at_look };
+        let together = is_even.then(|| sample(&by_road, found.pilot_s).probability());
+        let is_over = |found: &&Probability| {
+            by_road.iter().map(Vec::len).sum::<usize>() == parts_wanted || settings.is_enough(found)
+        };
         EstimateResults {
+            missed_goals: together
+                .as_ref()
+                .filter(is_over)
+                .map_or_else(Vec::new, |found| settings.missed_goals(found)),
             schema: 2,
             event: settings.event.clone(),
             method: settings.method,
             parts: found.records.len(),
-            parts_wanted: settings.parts as usize * roads.len(),
+            parts_wanted,
             missing: super::settings::MISSING,
             missing_at_look,
             roads: named
@@ -126,7 +141,7 @@ impl EstimateResults {
                         .probability(),
                 })
                 .collect(),
-            together: is_even.then(|| sample(&by_road, found.pilot_s).probability()),
+            together,
             mass: mass(roads, &by_road, found),
         }
     }

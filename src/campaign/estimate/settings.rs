@@ -231,6 +231,27 @@ impl EstimateSettings {
         is_precise || hours.is_some_and(|hours| found.simulated_h >= hours)
     }
 
+    /// Which goals were missed, in words, once nothing is left to play; none without goals.
+    pub fn missed_goals(&self, found: &Probability) -> Vec<String> {
+        let Stopping { precision, hours } = self.stopping;
+        let half = found.interval.high.map(|high| (high - found.interval.low) / 2.0);
+        let missed_precision = precision.and_then(|wanted| match half {
+            Some(half) if half <= wanted * found.probability => None,
+            Some(half) if found.probability > 0.0 => {
+                let reached = half / found.probability;
+                Some(format!("a precision of {wanted} was wanted, {reached:.2} is reached"))
+            }
+            _ => Some(format!("a precision of {wanted} was wanted, and the event was never met")),
+        });
+        // A precision that is reached stops it before.
+        let is_precise = precision.is_some() && missed_precision.is_none();
+        let missed_hours = hours.filter(|&hours| !is_precise && found.simulated_h < hours);
+        let missed_hours = missed_hours.map(|hours| {
+            format!("{hours} h were wanted, {:.2} h were simulated in all parts", found.simulated_h)
+        });
+        missed_precision.into_iter().chain(missed_hours).collect()
+    }
+
     /// # Errors
     /// If a number is out of range, or the method is not possible with this driving system.
     pub fn check(&self) -> Result<(), EstimateError> {

@@ -33,8 +33,8 @@ pub use measured::Measure;
 pub use mechanisms::{
     MechanismShare, Mechanisms, Share, WithoutMechanism, mechanism_shares, mechanisms, placebo,
 };
-pub use recurrence::{Recurrence, Replayed, can_replay};
+pub use recurrence::{MIXED, Recurrence, Replayed, can_replay};
 pub use severity::{Harm, Severity, severity};
-pub use shrink::{Shrunk, shrink, spare_steps};
+pub use shrink::{Shrunk, Worth, shrink, spare_steps};
 pub use variation::{Likelihood, likelihood};
 pub use verify::{ClaimResult, NoTries, Replays, verify};

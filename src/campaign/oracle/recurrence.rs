@@ -2,8 +2,8 @@
 //!
 //! One seed's crash is a candidate. The same scenario is played with other errors of the driving system's sensors, and with
 //! others who look at the world at other moments, so that they react by up to 0.1 s sooner or later; all else stays.
-//! (`variation` changes the scenario, too.) A finding that is bound to one draw of the noise is a fluke. A driving system
-//! of ours whose sensors have no noise (all but `modular`) meets other reactions alone.
+//! (`variation` changes the scenario, too.) A driving system of ours whose sensors have no noise (all but `modular`) meets other
+//! reactions alone. One that is not deterministic meets its own chance, too, which no replay can tell from the noise.
 
 use core::fmt;
 
@@ -25,17 +25,41 @@ pub struct Recurrence {
     pub replays: u32,
 }
 
+/// What is added to a recurrence where the driving system need not repeat itself.
+pub const MIXED: &str = "the program is not deterministic, so this mixes its chance with the noise";
+
 impl Recurrence {
-    /// Whether it happens again in no more than half of the replays.
-    pub fn is_fluke(self) -> bool {
-        2 * self.recurred <= self.replays
+    /// Whether it recurs: the 95 % interval of the share lies above one half. The share itself is too noisy: findings with 11
+    /// of 20 fell to 31 to 49 of 100.
+    pub fn recurs(self) -> bool {
+        self.interval()[0] > 0.5
+    }
+
+    /// Whether it recurs, in a word. `is_mixed`: a driving system that is not deterministic is never cleared.
+    pub fn word(self, is_mixed: bool) -> &'static str {
+        match self.interval() {
+            [low, _] if low > 0.5 => "recurs",
+            [_, high] if high < 0.5 && !is_mixed => "rarely recurs",
+            _ => "may recur",
+        }
+    }
+
+    /// The 95 % interval of the share, after Wilson.
+    pub fn interval(self) -> [f64; 2] {
+        proportion(self.recurred, self.replays).1
+    }
+
+    /// For the reader: `recurs in 14 of 20 (0.48 to 0.85)`, with [`MIXED`] if it is.
+    pub fn in_words(self, is_mixed: bool) -> String {
+        let mixed = if is_mixed { format!("; {MIXED}") } else { String::new() };
+        format!("recurs in {self}{mixed}")
     }
 }
 
 /// With the 95 % interval of the share, after Wilson: `14 of 20 (0.48 to 0.85)`.
 impl fmt::Display for Recurrence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (_, [low, high]) = proportion(self.recurred, self.replays);
+        let [low, high] = self.interval();
         write!(f, "{} of {} ({low:.2} to {high:.2})", self.recurred, self.replays)
     }
 }
@@ -51,22 +75,8 @@ impl<'a> Replayed<'a> {
     /// Plays `script`, which led to `log`, so many times more. One step without an action comes after it, so that what only
     /// happens later is still seen.
     pub fn new(setup: &'a Setup, script: &Script, log: &'a EpisodeLog, replays: u32) -> Replayed<'a> {
-        let mut script = script.clone();
-        script.steps.push(None);
-        let play = |number| {
-            let setup = Setup {
-                ads: setup.ads.clone().with_other_noise(number),
-                start: Start {
-                    // Never 0, which is the usual order.
-                    reactions: rng::child_seed(setup.seed, Stream::Noise, u64::from(number)) | 1,
-                    ..setup.start
-                },
-                ..setup.clone()
-            };
-            let mut choose = |moment: &Moment| script.choose(moment);
-            episode::run(&setup, &mut choose)
-        };
-        Replayed { setup, log, again: (1..=replays).map(play).collect() }
+        let script = with_a_step_more(script);
+        Replayed { setup, log, again: (1..=replays).map(|number| replay(setup, &script, number)).collect() }
     }
 
     /// How often a finding of the log happened again in the first `replays`, of which there must be so many. A collision does
@@ -77,6 +87,46 @@ impl<'a> Replayed<'a> {
         let recurred = self.again[..replays as usize].iter().filter(|log| case.is_again(log)).count();
         Recurrence { recurred: recurred as u32, replays }
     }
+}
+
+/// Whether a finding happens again in at least `needed` of so many replays, and how many were played to know it.
+pub(super) fn recurs_in(
+    setup: &Setup,
+    script: &Script,
+    (log, found): (&EpisodeLog, Found),
+    needed: u32,
+    replays: u32,
+) -> (bool, u32) {
+    let (case, script) = (Case::new(setup, log, found), with_a_step_more(script));
+    let mut recurred = 0;
+    for number in 1..=replays {
+        if recurred >= needed || recurred + (replays + 1 - number) < needed {
+            return (recurred >= needed, number - 1);
+        }
+        recurred += u32::from(case.is_again(&replay(setup, &script, number)));
+    }
+    (recurred >= needed, replays)
+}
+
+fn with_a_step_more(script: &Script) -> Script {
+    let mut script = script.clone();
+    script.steps.push(None);
+    script
+}
+
+/// The nth play of a script under other chance.
+fn replay(setup: &Setup, script: &Script, number: u32) -> EpisodeLog {
+    let setup = Setup {
+        ads: setup.ads.clone().with_other_noise(number),
+        start: Start {
+            // Never 0, which is the usual order.
+            reactions: rng::child_seed(setup.seed, Stream::Noise, u64::from(number)) | 1,
+            ..setup.start
+        },
+        ..setup.clone()
+    };
+    let mut choose = |moment: &Moment| script.choose(moment);
+    episode::run(&setup, &mut choose)
 }
 
 /// Whether a driving system can be asked for other drives. One outside this program that is known by its recorded answers
@@ -90,9 +140,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn half_of_the_replays_is_a_fluke() {
-        assert!(Recurrence { recurred: 10, replays: 20 }.is_fluke());
-        assert!(!Recurrence { recurred: 11, replays: 20 }.is_fluke());
-        assert_eq!(Recurrence { recurred: 14, replays: 20 }.to_string(), "14 of 20 (0.48 to 0.85)");
+    fn a_finding_recurs_if_its_interval_lies_above_one_half() {
+        let of = |recurred, replays| Recurrence { recurred, replays };
+        assert!(of(15, 20).recurs() && !of(14, 20).recurs());
+        assert!(of(4, 4).recurs() && !of(3, 3).recurs());
+        assert_eq!(of(14, 20).to_string(), "14 of 20 (0.48 to 0.85)");
+        assert_eq!(
+            [15, 14, 6, 5].map(|count| of(count, 20).word(false)),
+            ["recurs", "may recur", "may recur", "rarely recurs"]
+        );
+        // The chance of the program itself clears nothing.
+        assert_eq!(of(1, 20).word(true), "may recur");
+        assert_eq!(of(5, 20).in_words(true), format!("recurs in 5 of 20 (0.11 to 0.47); {MIXED}"));
     }
 }

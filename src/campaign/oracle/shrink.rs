@@ -3,14 +3,18 @@
 //! Fewest actions first (ddmin, Zeller and Hildebrandt 2002), then fewest steps, ambient vehicles and
 //! effects, then the plainest start (noon under a clear sky) and values; all passes repeat until nothing
 //! changes. Every candidate is played, and every action in it must be legal by the rules of the space. The
-//! crash is the same if the ego vehicle hits an obstacle with the same body and verb, the class of the
-//! verdict is the same, and the space's verdict still counts it, or still does not. A breach is the same if it is one of
-//! the same requirement, and a careful driver still keeps that, or still none does. The result is
-//! 1-minimal: if any one step is removed, or replaced by waiting, the crash is gone or is another one.
+//! crash is the same if the ego vehicle hits an obstacle with the same body and verb, its pre-crash type, harm, priority and
+//! the class of the verdict are the same, and the space's verdict still counts it, or still does not. A breach is the same if
+//! it is one of the same requirement, and a careful driver still keeps that, or still none does.
+//!
+//! It must recur, too, as far as that was tried: a smaller candidate within the 95 % interval of what is shrunk. For a rounder
+//! number nothing is traded: neither recurrence nor the speed of the impact may fall. Replays come last and stop as soon as
+//! they have decided, because most candidates fail the cheap checks. The result is 1-minimal: if any one step is removed, or
+//! replaced by waiting, the crash is gone or is another one.
 
 use crate::episode;
 use crate::episode::{Choice, Collision, EpisodeLog, Moment, Outcome, Script, ScriptedAction, Setup};
-use avastra_lang::model::vocabulary::Verb;
+use avastra_lang::model::vocabulary::{Verb, Word};
 use avastra_lang::model::{Avoidability, BodyWord, Domain, Memory, Value};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::Start;
@@ -19,6 +23,8 @@ use super::avoidable::{Judgement, judge};
 use super::case::Found;
 use super::counted::counts;
 use super::kept::breached;
+use super::recurrence::{Recurrence, Replayed, recurs_in};
+use super::severity::severity;
 
 /// Most rounds of all passes. Each round makes something smaller or plainer; most crashes need two.
 const ROUNDS_MAX: usize = 8;
@@ -35,13 +41,72 @@ pub struct Shrunk {
     pub judgements: Vec<Judgement>,
     /// What was kept, in the log.
     pub found: Found,
+    /// How often what was shrunk recurs, if that was asked.
+    pub recurrence_before: Option<Recurrence>,
     /// Episodes that were played to find it.
     pub plays: u32,
 }
 
-/// Shrinks what led to a finding in a log that was played from `setup`; `judgements` has one for each collision.
-pub fn shrink(setup: &Setup, log: &EpisodeLog, found: Found, judgements: &[Judgement]) -> Shrunk {
-    let mut search = Search::new(setup, log, found, judgements);
+/// What makes a finding worth keeping.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Worth {
+    /// Speed at which the gap closed, m/s; `None` of a breach.
+    pub impact_mps: Option<f64>,
+    /// `None` of a breach.
+    pub harm: Option<&'static str>,
+    pub kind: Option<&'static str>,
+    pub priority: Option<&'static str>,
+    /// The margin of a breach, below 0, if it has one.
+    pub margin: Option<f64>,
+    pub recurrence: Option<Recurrence>,
+}
+
+impl Worth {
+    /// That of a finding of a log.
+    pub fn new(log: &EpisodeLog, found: Found, recurrence: Option<Recurrence>) -> Worth {
+        match found {
+            Found::Collision(index) => {
+                let collision = &log.collisions[index];
+                let severity = severity(collision);
+                Worth {
+                    impact_mps: Some(severity.closing_speed_mps),
+                    harm: Some(severity.harm.name()),
+                    kind: Some(collision.kind.name()),
+                    priority: Some(collision.contact.priority.name()),
+                    margin: None,
+                    recurrence,
+                }
+            }
+            Found::Breach(index) => {
+                let margin = log.breaches[index].margin;
+                Worth { impact_mps: None, harm: None, kind: None, priority: None, margin, recurrence }
+            }
+        }
+    }
+
+    /// Whether it is the same but for how hard and how often.
+    fn is_alike(&self, other: &Worth) -> bool {
+        (self.harm, self.kind, self.priority) == (other.harm, other.kind, other.priority)
+    }
+
+    /// Whether another is at least as hard.
+    fn is_no_harder_than(&self, other: &Worth) -> bool {
+        let at_most =
+            |one: Option<f64>, other: Option<f64>| one.zip(other).is_none_or(|(one, other)| one <= other);
+        at_most(self.impact_mps, other.impact_mps) && at_most(other.margin, self.margin)
+    }
+}
+
+/// Shrinks what led to a finding in a log that was played from `setup`; `judgements` has one for each collision. What is
+/// found must recur in so many `replays` as it did, 0 if that is not asked.
+pub fn shrink(
+    setup: &Setup,
+    log: &EpisodeLog,
+    found: Found,
+    judgements: &[Judgement],
+    replays: u32,
+) -> Shrunk {
+    let mut search = Search::new(setup, (log, found), judgements, replays);
     let mut best = Candidate::of(setup, log, found);
     for _ in 0..ROUNDS_MAX {
         let before = best.clone();
@@ -57,7 +122,9 @@ pub fn shrink(setup: &Setup, log: &EpisodeLog, found: Found, judgements: &[Judge
         }
     }
     let (kept, _) = search.keeps(&best, None).expect("every candidate that was taken makes the crash");
+    let recurrence_before = (replays > 0).then(|| search.recurrence());
     Shrunk {
+        recurrence_before,
         script: best.script,
         start: best.start,
         memory: best.memory,
@@ -69,10 +136,16 @@ pub fn shrink(setup: &Setup, log: &EpisodeLog, found: Found, judgements: &[Judge
 }
 
 /// Steps that are not needed for the nth collision of a log: each alone could be removed, or replaced by waiting, and
-/// the collision stays the same. Empty if the scenario is 1-minimal.
-pub fn spare_steps(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[Judgement]) -> Vec<usize> {
+/// the collision stays the same and recurs in so many `replays` as it did. Empty if the scenario is 1-minimal.
+pub fn spare_steps(
+    setup: &Setup,
+    log: &EpisodeLog,
+    index: usize,
+    judgements: &[Judgement],
+    replays: u32,
+) -> Vec<usize> {
     let found = Found::Collision(index);
-    let mut search = Search::new(setup, log, found, judgements);
+    let mut search = Search::new(setup, (log, found), judgements, replays);
     let whole = Candidate::of(setup, log, found);
     let steps = whole.script.steps.len();
     let is_spare = |&step: &usize| {
@@ -80,8 +153,8 @@ pub fn spare_steps(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[
         let acts = waiting.script.steps[step].take().is_some();
         let mut shorter = whole.clone();
         shorter.script.steps.remove(step);
-        (acts && search.keeps(&waiting, None).is_some())
-            || (steps > 1 && search.keeps(&shorter, None).is_some())
+        (acts && search.holds(&waiting, For::Size).is_some())
+            || (steps > 1 && search.holds(&shorter, For::Size).is_some())
     };
     (0..steps).filter(is_spare).collect()
 }
@@ -125,10 +198,27 @@ enum Wanted {
     },
 }
 
+/// What a candidate is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum For {
+    /// Fewer or simpler parts.
+    Size,
+    /// The same parts with plainer values.
+    Roundness,
+}
+
 /// What must stay, and the number of plays so far.
 struct Search<'a> {
     setup: &'a Setup,
     wanted: Wanted,
+    /// What is shrunk, and how hard it is.
+    whole: Candidate,
+    log: &'a EpisodeLog,
+    found: Found,
+    worth: Worth,
+    replays: u32,
+    /// How often what is shrunk recurs, once that was asked.
+    recurrence: Option<Recurrence>,
     plays: u32,
 }
 
@@ -136,7 +226,12 @@ struct Search<'a> {
 type Wish<'w> = Option<(usize, &'w ScriptedAction)>;
 
 impl<'a> Search<'a> {
-    fn new(setup: &'a Setup, log: &EpisodeLog, found: Found, judgements: &[Judgement]) -> Search<'a> {
+    fn new(
+        setup: &'a Setup,
+        (log, found): (&'a EpisodeLog, Found),
+        judgements: &[Judgement],
+        replays: u32,
+    ) -> Search<'a> {
         let wanted = match found {
             Found::Collision(index) => Wanted::Crash {
                 body: log.collisions[index].body,
@@ -149,7 +244,44 @@ impl<'a> Search<'a> {
                 Wanted::Breach { requirement, is_kept: is_kept(setup, log, requirement) }
             }
         };
-        Search { setup, wanted, plays: 0 }
+        let (whole, worth) = (Candidate::of(setup, log, found), Worth::new(log, found, None));
+        Search { setup, wanted, whole, log, found, worth, replays, recurrence: None, plays: 0 }
+    }
+
+    /// How often what is shrunk recurs.
+    fn recurrence(&mut self) -> Recurrence {
+        let Search { setup, ref whole, log, found, replays, .. } = *self;
+        let known = self.recurrence;
+        let recurrence = known
+            .unwrap_or_else(|| Replayed::new(setup, &whole.script, log, replays).recurrence(found, replays));
+        self.plays += if known.is_none() { replays } else { 0 };
+        self.recurrence = Some(recurrence);
+        recurrence
+    }
+
+    /// As [`Search::keeps`], if it also recurs as it must, and for a rounder number is no softer.
+    fn holds(&mut self, candidate: &Candidate, purpose: For) -> Option<Script> {
+        let (kept, script) = self.keeps(candidate, None)?;
+        self.is_worth(candidate, &script, &kept, purpose).then_some(script)
+    }
+
+    fn is_worth(&mut self, candidate: &Candidate, script: &Script, kept: &Kept, purpose: For) -> bool {
+        let worth = Worth::new(&kept.log, kept.found, None);
+        if purpose == For::Roundness && !self.worth.is_no_harder_than(&worth) {
+            return false;
+        }
+        if self.replays == 0 {
+            return true;
+        }
+        let recurrence = self.recurrence();
+        let needed = match purpose {
+            For::Size => (recurrence.interval()[0] * f64::from(self.replays)).ceil() as u32,
+            For::Roundness => recurrence.recurred,
+        };
+        let setup = self.begin(candidate);
+        let (holds, plays) = recurs_in(&setup, script, (&kept.log, kept.found), needed, self.replays);
+        self.plays += plays;
+        holds
     }
 
     /// Plays a candidate; `None` if the crash is another or none, or an action is not legal. With a wish,
@@ -167,16 +299,18 @@ impl<'a> Search<'a> {
         let judged = || judge(&setup, &script, &log);
         let (found, judgements) = match self.wanted {
             Wanted::Crash { body, verb, class, counts: is_counted } => {
-                let alike = |collision: &Collision| collision.body == body && collision.verb == verb;
-                if !log.collisions.iter().any(alike) {
+                let alike = |index: &usize| {
+                    let Collision { body: hit, verb: done, .. } = log.collisions[*index];
+                    let worth = Worth::new(&log, Found::Collision(*index), None);
+                    hit == body && done == verb && worth.is_alike(&self.worth)
+                };
+                if !(0..log.collisions.len()).any(|index| alike(&index)) {
                     return None;
                 }
                 let judgements = judged();
                 let same = |index: &usize| {
                     let counts = counts(self.setup.table.space(), &log, *index, &judgements[*index]);
-                    alike(&log.collisions[*index])
-                        && judgements[*index].class == class
-                        && counts == is_counted
+                    alike(index) && judgements[*index].class == class && counts == is_counted
                 };
                 (Found::Collision((0..log.collisions.len()).find(same)?), judgements)
             }
@@ -207,9 +341,9 @@ impl<'a> Search<'a> {
         Setup { start: candidate.start, memory: candidate.memory.clone(), ..self.setup.clone() }
     }
 
-    /// Takes a candidate if it keeps the crash.
-    fn take(&mut self, best: &mut Candidate, candidate: Candidate, wish: Wish) -> bool {
-        let Some((_, script)) = self.keeps(&candidate, wish) else { return false };
+    /// Takes a candidate if it keeps the crash and what that is worth.
+    fn take(&mut self, best: &mut Candidate, candidate: Candidate, purpose: For) -> bool {
+        let Some(script) = self.holds(&candidate, purpose) else { return false };
         *best = Candidate { script, ..candidate };
         true
     }
@@ -230,7 +364,7 @@ impl<'a> Search<'a> {
                 candidate
             };
             let candidates: Vec<Candidate> = acting.chunks(size).map(without).collect();
-            let found = candidates.into_iter().any(|candidate| self.take(best, candidate, None));
+            let found = candidates.into_iter().any(|candidate| self.take(best, candidate, For::Size));
             if found {
                 parts = 2.max(parts - 1);
             } else if size == 1 {
@@ -247,7 +381,7 @@ impl<'a> Search<'a> {
         while step < best.script.steps.len() {
             let mut candidate = best.clone();
             candidate.script.steps.remove(step);
-            if candidate.script.steps.is_empty() || !self.take(best, candidate, None) {
+            if candidate.script.steps.is_empty() || !self.take(best, candidate, For::Size) {
                 step += 1;
             }
         }
@@ -259,7 +393,7 @@ impl<'a> Search<'a> {
         while fewer < best.start.ambient {
             let mut candidate = best.clone();
             candidate.start.ambient = fewer;
-            if self.take(best, candidate, None) {
+            if self.take(best, candidate, For::Size) {
                 return;
             }
             fewer += (best.start.ambient - fewer).div_ceil(2);
@@ -274,7 +408,7 @@ impl<'a> Search<'a> {
                 continue;
             };
             if action.trigger.take().is_some() {
-                self.take(best, candidate, None);
+                self.take(best, candidate, For::Size);
             }
         }
     }
@@ -294,7 +428,7 @@ impl<'a> Search<'a> {
                 let mut candidate = best.clone();
                 candidate.script.steps[step] =
                     Some(ScriptedAction { row, values: draw.values.clone(), trigger: None });
-                if self.take(best, candidate, None) {
+                if self.take(best, candidate, For::Size) {
                     break;
                 }
             }
@@ -317,7 +451,7 @@ impl<'a> Search<'a> {
             let Start { ego_mps, signal_phase_s, seed, ambient, traffic, .. } = best.start;
             let start = Start::drawn(space, self.setup.road(), &candidate.memory, self.setup.seed);
             candidate.start = Start { ego_mps, signal_phase_s, seed, ambient, traffic, ..start };
-            self.take(best, candidate, None);
+            self.take(best, candidate, For::Roundness);
         }
     }
 
@@ -327,7 +461,7 @@ impl<'a> Search<'a> {
         for unit_s in [10.0, 1.0] {
             let mut candidate = best.clone();
             candidate.start.signal_phase_s = (phase_s / unit_s).floor() * unit_s;
-            if candidate.start != best.start && self.take(best, candidate, None) {
+            if candidate.start != best.start && self.take(best, candidate, For::Roundness) {
                 break;
             }
         }
@@ -368,10 +502,12 @@ impl<'a> Search<'a> {
         };
         for wanted in candidates {
             let wish = with(wanted);
-            let Some((_, script)) = self.keeps(best, Some((step, &wish))) else { continue };
+            let Some((kept, script)) = self.keeps(best, Some((step, &wish))) else { continue };
             // A value that the rules have changed is no plainer than the old one.
             let got = script.steps.get(step).and_then(Option::as_ref);
-            if got.is_some_and(|got| got.values[index].1 == wanted) {
+            if got.is_some_and(|got| got.values[index].1 == wanted)
+                && self.is_worth(best, &script, &kept, For::Roundness)
+            {
                 best.script = script;
                 return;
             }

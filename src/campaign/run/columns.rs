@@ -43,7 +43,8 @@ pub fn columns(path: &Path, table: &str) -> Result<Vec<Column>, DatabaseError> {
         .query_map([table], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?
         .collect::<Result<_, _>>()?;
     if described.is_empty() {
-        return Err(DatabaseError::Damaged { what: format!("no table `{table}`") });
+        let known: Vec<String> = LAYOUT.tables.iter().map(|name| format!("`{name}`")).collect();
+        return Err(DatabaseError::NoTable { name: table.to_owned(), known: known.join(", ") });
     }
     let mut columns: Vec<Column> = described
         .iter()

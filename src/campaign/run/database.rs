@@ -304,15 +304,6 @@ impl Database {
         Ok(self.connection.query_row(query, [requirement], |row| row.get(0))?)
     }
 
-    /// The requirements that were breached, each with the first episode in which it was.
-    ///
-    /// # Errors
-    /// If the file cannot be read.
-    pub fn first_breaches(&self) -> Result<BTreeMap<String, i64>, DatabaseError> {
-        let query = "SELECT requirement, min(episode) FROM breach GROUP BY requirement";
-        Ok(query_all(&self.connection, query, |row| Ok((row.get(0)?, row.get(1)?)))?.into_iter().collect())
-    }
-
     /// The requirements that were in force, by name: how often each was breached, and how near it came to that.
     ///
     /// # Errors
@@ -327,7 +318,7 @@ impl Database {
                     (SELECT road || '/' || episode.episode
                      FROM breach JOIN episode USING (episode) JOIN scenario USING (episode)
                      WHERE breach.requirement = margin.requirement
-                     ORDER BY coalesce(breach.margin, 0), episode LIMIT 1),
+                     ORDER BY replays IS NULL, coalesce(breach.margin, 0), episode LIMIT 1),
                     sum(asked_s), sum(asked_s > 0),
                     (SELECT count(DISTINCT episode) FROM breach
                      WHERE breach.requirement = margin.requirement AND kept_by IS NOT NULL)
@@ -362,12 +353,19 @@ impl Database {
     /// # Errors
     /// If the file cannot be read.
     pub fn totals(&self) -> Result<Totals, DatabaseError> {
+        // A requirement that is breached several times in an episode is one finding.
+        let findings = "SELECT recurred, replays, TRUE FROM collision WHERE counted
+             UNION ALL SELECT min(recurred), min(replays), FALSE FROM breach GROUP BY episode, requirement";
+        let findings = query_all(&self.connection, findings, |row| {
+            Ok(from_columns(row.get(0)?, row.get(1)?).zip(row.get::<_, Option<bool>>(2)?))
+        })?;
+        let replayed: Vec<(Recurrence, bool)> = findings.into_iter().flatten().collect();
+        let recurring: Vec<bool> =
+            replayed.iter().filter(|(of, _)| of.recurs()).map(|(_, is_collision)| *is_collision).collect();
+        let counted_recurring = recurring.iter().filter(|is_collision| **is_collision).count() as i64;
+        let (replayed, recurring) = (replayed.len() as i64, recurring.len() as i64);
         Ok(self.connection.query_row(
-            // A requirement that is breached several times in an episode is one finding.
-            "WITH finding AS (
-               SELECT recurred, replays FROM collision WHERE counted
-               UNION ALL SELECT min(recurred), min(replays) FROM breach GROUP BY episode, requirement)
-             SELECT count(*), coalesce(sum(collisions), 0), coalesce(sum(counted), 0),
+            "SELECT count(*), coalesce(sum(collisions), 0), coalesce(sum(counted), 0),
                         coalesce(sum(collisions > 0), 0), coalesce(sum(counted > 0), 0),
                         coalesce(sum(ended = 'arrived'), 0), coalesce(sum(ended = 'stalled'), 0),
                         coalesce(sum(ended = 'limit'), 0), coalesce(sum(duration_s), 0.0),
@@ -383,19 +381,46 @@ impl Database {
                         (SELECT coalesce(sum(priority = 'other'), 0) FROM collision),
                         coalesce(sum(ended = 'blocked'), 0), (SELECT count(*) FROM failure),
                         coalesce(sum(ended = 'astray'), 0), coalesce(sum(ended = 'left_the_map'), 0),
-                        (SELECT count(DISTINCT episode) FROM breach),
-                        (SELECT count(replays) FROM finding), (SELECT coalesce(sum(2 * recurred > replays), 0) FROM finding)
+                        (SELECT count(DISTINCT episode) FROM breach), ?1, ?2, ?3,
+                        coalesce(sum(red_runs > 0 AND counted = 0
+                          AND episode NOT IN (SELECT episode FROM breach)), 0)
                  FROM episode",
-            [],
+            [replayed, recurring, counted_recurring],
             |row| {
                 let totals = of_columns!(
                     row,
                     0,
                     Totals {
-                        episodes, collisions, counted, episodes_with_collision, episodes_with_counted, arrived,
-                        stalled, step_limit, simulated_s, driven_m, red_runs, first_counted_s_mean, sudden,
-                        struck, repeated, avoidable, beyond_reference, unavoidable, branched_s, wronged, wrong,
-                        blocked, failed, astray, left_map, episodes_with_breach, replayed, recurring,
+                        episodes,
+                        collisions,
+                        counted,
+                        episodes_with_collision,
+                        episodes_with_counted,
+                        arrived,
+                        stalled,
+                        step_limit,
+                        simulated_s,
+                        driven_m,
+                        red_runs,
+                        first_counted_s_mean,
+                        sudden,
+                        struck,
+                        repeated,
+                        avoidable,
+                        beyond_reference,
+                        unavoidable,
+                        branched_s,
+                        wronged,
+                        wrong,
+                        blocked,
+                        failed,
+                        astray,
+                        left_map,
+                        episodes_with_breach,
+                        replayed,
+                        recurring,
+                        counted_recurring,
+                        red_unkept,
                     }
                 );
                 Ok(totals)
@@ -422,7 +447,8 @@ pub struct RequirementCount {
     /// The smallest margin of all episodes, in the unit; `None` if it has none or was never asked.
     pub smallest: Option<f64>,
     pub unit: Option<String>,
-    /// Name of the episode with the smallest margin, and name of the scenario with the worst breach.
+    /// Name of the episode with the smallest margin, and name of the scenario with the worst breach, of those that were played
+    /// again if any were.
     pub nearest: Option<String>,
     pub scenario: Option<String>,
 }
@@ -458,9 +484,11 @@ pub struct Totals {
     /// Episodes in which a requirement was breached.
     pub episodes_with_breach: i64,
     /// Counted collisions and requirements breached, one for each episode, that were played again under other chance, and
-    /// those of them that recur in more than half of the replays.
+    /// those of them that recur, as [`Recurrence::recurs`] says.
     pub replayed: i64,
     pub recurring: i64,
+    /// Those of them that are counted collisions.
+    pub counted_recurring: i64,
     pub arrived: i64,
     /// Ended without progress: for a reason of the driving system's own, because others blocked its way, and
     /// because it had left its lane.
@@ -475,6 +503,8 @@ pub struct Totals {
     pub simulated_s: f64,
     pub driven_m: f64,
     pub red_runs: i64,
+    /// Episodes in which one was passed and nothing was found, so that no scenario is kept.
+    pub red_unkept: i64,
     /// Mean time to the first counted collision over the episodes that have one, s: the paper's
     /// "TTC" (survivorship-biased, like the paper's).
     pub first_counted_s_mean: Option<f64>,
@@ -668,6 +698,12 @@ fn add_episode(
         summary.branched_s,
     ];
     insert_row(transaction, "episode", values)
+}
+
+/// From its two columns; `None` where it was not tried, or where they do not belong together.
+pub(crate) fn from_columns(recurred: Option<u32>, replays: Option<u32>) -> Option<Recurrence> {
+    let found = Recurrence { recurred: recurred?, replays: replays? };
+    (found.replays > 0 && found.recurred <= found.replays).then_some(found)
 }
 
 /// Its two columns, empty where it was not tried.

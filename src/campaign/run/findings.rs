@@ -1,23 +1,30 @@
 //! What a run found, by how sure and how bad it is.
 
+use core::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use crate::oracle::Recurrence;
-use crate::run::database::Database;
+use crate::run::database::{Database, from_columns};
 use crate::run::sealed::{DatabaseError, query_all};
+
+/// What [`FoundIn::finding`] is where it is no requirement.
+pub const COLLISION: &str = "collision";
 
 /// An episode with a collision or a breach.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct FoundIn {
     pub road: String,
     pub episode: i64,
-    /// Whether it has a counted collision or a breach. If so, the rest is about those alone.
+    /// Whether it has a counted collision or a breach. If so, the rest is about one of those.
     pub critical: bool,
-    /// The finding that recurs most often, if that was tried.
+    /// What the rest is about: [`COLLISION`], or the requirement that was breached. One that recurs comes before others, a
+    /// collision before a breach, and a hard one before a light one.
+    pub finding: String,
+    /// How often it recurs, if that was tried.
     pub recurrence: Option<Recurrence>,
-    /// What the worst collision means for people, in the words of `oracle::Harm`; `None` of a breach alone.
+    /// What a collision means for people, in the words of `oracle::Harm`; `None` of a breach.
     pub harm: Option<String>,
-    /// As `oracle::Severity::harm_share`; 0 of a breach alone.
+    /// As `oracle::Severity::harm_share`; 0 of a breach.
     pub harm_share: f64,
 }
 
@@ -27,20 +34,29 @@ impl FoundIn {
         format!("{}_{:04}", self.road, self.episode)
     }
 
-    /// Whether none of its findings recurs in more than half of the replays.
-    pub fn is_fluke(&self) -> bool {
-        self.recurrence.is_some_and(Recurrence::is_fluke)
+    /// In the terminal's list of scenarios: whose recurrence it is, and how bad it is.
+    pub fn in_words(&self) -> String {
+        let again = self.recurrence.map(|of| of.in_words(false));
+        let again = match self.harm {
+            Some(_) => again,
+            None => {
+                Some(again.map_or_else(|| self.in_ticks(), |again| format!("{} {again}", self.in_ticks())))
+            }
+        };
+        again.into_iter().chain(self.harm.clone()).collect::<Vec<_>>().join(", ")
     }
 
-    /// Takes in another finding of the same episode.
-    fn with(self, other: FoundIn) -> FoundIn {
-        if self.critical != other.critical {
-            return if self.critical { self } else { other };
-        }
-        let recurrence =
-            [self.recurrence, other.recurrence].into_iter().flatten().max_by_key(|of| of.recurred);
-        let worst = if other.harm_share > self.harm_share { other } else { self };
-        FoundIn { recurrence, ..worst }
+    fn in_ticks(&self) -> String {
+        format!("`{}`", self.finding)
+    }
+
+    /// The surest and worst first.
+    fn order(&self, other: &FoundIn) -> Ordering {
+        // What was not tried is not known to be a matter of chance.
+        let key = |of: &FoundIn| {
+            (!of.critical, !of.recurrence.is_none_or(Recurrence::recurs), of.finding != COLLISION)
+        };
+        key(self).cmp(&key(other)).then(other.harm_share.total_cmp(&self.harm_share))
     }
 }
 
@@ -104,28 +120,24 @@ impl Database {
         Ok(found)
     }
 
-    /// Each episode with a collision or a breach: those that count first, flukes after the others, then the worst first.
+    /// Each episode with a collision or a breach: those that count first, then those that recur, then the worst.
     ///
     /// # Errors
-    /// If the database cannot be read, or says that something recurred more often than it was tried.
+    /// If the database cannot be read.
     pub fn found(&self) -> Result<Vec<FoundIn>, DatabaseError> {
         let query = "WITH finding AS (
-               SELECT episode, counted, recurred, replays, harm, harm_share FROM collision
-               UNION ALL SELECT episode, 1, recurred, replays, NULL, 0.0 FROM breach)
-             SELECT road, episode, finding.counted, recurred, replays, harm, harm_share
-             FROM finding JOIN episode USING (episode) ORDER BY episode";
+               SELECT episode, number, NULL AS name, counted, recurred, replays, harm, harm_share FROM collision
+               UNION ALL SELECT episode, number, requirement, 1, recurred, replays, NULL, 0.0 FROM breach)
+             SELECT road, episode, finding.counted, recurred, replays, harm, harm_share, name
+             FROM finding JOIN episode USING (episode) ORDER BY episode, name IS NOT NULL, number";
         let rows = query_all(&self.connection, query, |row| {
-            let tried: (Option<u32>, Option<u32>) = (row.get(3)?, row.get(4)?);
+            let name: Option<String> = row.get(7)?;
             Ok(FoundIn {
                 road: row.get(0)?,
                 episode: row.get(1)?,
                 critical: row.get(2)?,
-                recurrence: match tried {
-                    (Some(recurred), Some(replays)) if replays > 0 && recurred <= replays => {
-                        Some(Recurrence { recurred, replays })
-                    }
-                    _ => None,
-                },
+                finding: name.unwrap_or_else(|| COLLISION.to_owned()),
+                recurrence: from_columns(row.get(3)?, row.get(4)?),
                 harm: row.get(5)?,
                 harm_share: row.get(6)?,
             })
@@ -133,16 +145,13 @@ impl Database {
         let mut found: BTreeMap<i64, FoundIn> = BTreeMap::new();
         for one in rows {
             let all = match found.remove(&one.episode) {
-                Some(known) => known.with(one),
-                None => one,
+                Some(known) if known.order(&one).is_le() => known,
+                Some(_) | None => one,
             };
             found.insert(all.episode, all);
         }
         let mut found: Vec<FoundIn> = found.into_values().collect();
-        found.sort_by(|a, b| {
-            let order = |of: &FoundIn| (!of.critical, of.is_fluke());
-            order(a).cmp(&order(b)).then(b.harm_share.total_cmp(&a.harm_share))
-        });
+        found.sort_by(FoundIn::order);
         Ok(found)
     }
 }

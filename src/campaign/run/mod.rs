@@ -39,8 +39,8 @@ pub use offered::in_words as refusal_in_words;
 pub use offered::{Offered, RowCount};
 pub use play::{Run, play};
 pub use profile::{
-    Asked, DEFAULT_ADS, Profile, TrafficRecord, driving_system, recorded, recorded_traffic, started,
-    trained_against,
+    Asked, DEFAULT_ADS, Profile, TrafficRecord, driving_system, found_with, recorded, recorded_traffic,
+    started, trained_against,
 };
 pub(crate) use profile::{traffic_of, under_test};
 pub use protocol::{Ending, HeatMap, ProtocolTest, Tally, heat_maps, main_maps, parameters};

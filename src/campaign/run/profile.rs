@@ -57,6 +57,11 @@ impl TrafficRecord {
         let is_default = *traffic == TrafficProfile::default();
         (!is_default).then(|| TrafficRecord { digest: traffic.digest(), settings: *traffic })
     }
+
+    /// The name of the shipped profile, or what an own one changes, in one line.
+    pub fn in_words(&self) -> String {
+        self.settings.shipped_as().map_or_else(|| self.settings.to_line(), str::to_owned)
+    }
 }
 
 /// The traffic profile that the settings of a run or a training record; without a record the default.
@@ -152,6 +157,17 @@ pub fn recorded(scenario: &Scenario) -> Result<Selected, RunError> {
         return Ok(Selected::external(Program::recorded(attached, answers)));
     }
     selected(&scenario.name, ads, origin.profile.as_deref(), origin.profile_digest.as_deref())
+}
+
+/// What the driving system is called that a scenario was found with; of an external one its name without the version, which
+/// is meant to change.
+pub fn found_with(scenario: &Scenario) -> String {
+    let ads = scenario.origin.ads.as_deref().unwrap_or(DEFAULT_ADS);
+    let attached = || attached(scenario).ok();
+    match ads {
+        EXTERNAL => attached().map_or_else(|| ads.to_owned(), |attached| attached.title()),
+        _ => ads.to_owned(),
+    }
 }
 
 /// The external driving system that a scenario names.

@@ -295,7 +295,9 @@ pub struct Tally {
     pub endings: [u32; 4],
     /// Tests with a breach.
     pub breached: u32,
-    /// The mean speed at contacts, and what was lost of the speed before them, m/s.
+    /// Means over contacts, m/s: the speed of the two against each other, that of the ego vehicle, and what this lost of its
+    /// speed before.
+    pub relative_mps: Option<f64>,
     pub impact_mps: Option<f64>,
     pub reduction_mps: Option<f64>,
 }
@@ -303,17 +305,19 @@ pub struct Tally {
 impl Tally {
     pub fn of<'t>(tests: impl IntoIterator<Item = &'t ProtocolTest>) -> Tally {
         let mut tally = Tally::default();
-        let (mut impacts, mut reductions) = (Vec::new(), Vec::new());
+        let (mut relatives, mut impacts, mut reductions) = (Vec::new(), Vec::new(), Vec::new());
         for test in tests {
             if let Some(ending) = test.ending {
                 tally.endings[ending as usize] += 1;
             }
             tally.breached += u32::from(!test.breached.is_empty());
+            relatives.extend(test.relative_mps);
             impacts.extend(test.impact_mps);
             reductions.extend(test.reduction_mps());
         }
         let mean =
             |values: Vec<f64>| (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64);
+        tally.relative_mps = mean(relatives);
         (tally.impact_mps, tally.reduction_mps) = (mean(impacts), mean(reductions));
         tally
     }

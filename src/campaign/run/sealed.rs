@@ -28,8 +28,15 @@ CREATE TABLE seal (unit INTEGER PRIMARY KEY, digest TEXT NOT NULL) STRICT;
 /// Why a run database cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum DatabaseError {
-    #[error("it has layout {found}, this version of avastra reads {wanted}: begin a new one")]
+    #[error(
+        "it has layout {found}, and this version of avastra reads {wanted}: the version that wrote it still reads it; to go \
+         on with this one, begin a new one beside it"
+    )]
     Layout { found: i64, wanted: i64 },
+    #[error("it is the database of {found}, and one of {wanted} is wanted here")]
+    OtherKind { found: &'static str, wanted: &'static str },
+    #[error("it has no table `{name}`: there are {known}")]
+    NoTable { name: String, known: String },
     #[error("it is empty: `--resume` plays all again")]
     Empty,
     #[error("it names an episode {found}")]
@@ -75,6 +82,16 @@ impl From<rusqlite::Error> for DatabaseError {
             Some(DatabaseCorrupt | NotADatabase) => DatabaseError::Damaged { what: error.to_string() },
             _ => DatabaseError::Sqlite(error),
         }
+    }
+}
+
+/// What a layout's number is of: each kind of database counts in a thousand of its own.
+fn kind(version: i64) -> Option<&'static str> {
+    match version {
+        1..1000 => Some("a run or a training"),
+        1000..2000 => Some("a study"),
+        2000..3000 => Some("an estimate"),
+        _ => None,
     }
 }
 
@@ -176,7 +193,10 @@ impl Layout {
         match found {
             found if found == self.version => Ok(true),
             0 if is_empty()? => Ok(false),
-            found => Err(DatabaseError::Layout { found, wanted: self.version }),
+            found => Err(match (kind(found), kind(self.version)) {
+                (Some(found), Some(wanted)) if found != wanted => DatabaseError::OtherKind { found, wanted },
+                _ => DatabaseError::Layout { found, wanted: self.version },
+            }),
         }
     }
 

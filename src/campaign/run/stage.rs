@@ -140,7 +140,8 @@ impl<'a> Stage<'a> {
                 if ads.program().is_some_and(|program| !program.can_start()) {
                     return Err(NoTries);
                 }
-                Ok(oracle::spare_steps(&setup, log, index, &judgements))
+                let replays = self.scenario.replays();
+                Ok(oracle::spare_steps(&setup, log, index, &judgements, replays))
             },
         };
         oracle::verify(self.table.space(), self.scenario, log, &judgements, &replays)

@@ -77,6 +77,7 @@ pub enum Misbehaviour {
     Garbage,
     Nan,
     Late,
+    LateOnce,
     Twice,
     WrongSeq,
     HugeLine,

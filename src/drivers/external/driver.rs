@@ -19,7 +19,7 @@ use super::message::{Answer, Event, Observation, Question};
 use super::program::{MapLine, Program};
 use super::question;
 use super::record::{Conversation, Key, Outcome};
-use super::session::Session;
+use super::session::{Patience, Session};
 use super::settings::OnTimeout;
 
 /// After this simulated time without an answer the vehicle brakes, s: Apollo's 20 planning cycles.
@@ -199,13 +199,20 @@ impl External {
             session.ready(question, "reset", settings.timeouts.reset_s)?;
             return Ok(Outcome::Ready);
         };
-        match session.step(question, (seq, t_us), settings.timeouts.step_s)? {
-            Some(answer) => Ok(Outcome::answered(answer)),
-            None if settings.on_timeout == OnTimeout::Hold => {
+        let is_graceful = settings.on_timeout == OnTimeout::Strict;
+        match session.step(
+            question,
+            (seq, t_us),
+            Patience { limit_s: settings.timeouts.step_s, is_graceful },
+        )? {
+            Some((answer, took_s)) => {
+                self.program.thought(took_s);
+                Ok(Outcome::answered(answer))
+            }
+            None => {
                 self.program.miss();
                 Ok(Outcome::Missed)
             }
-            None => Err(session.too_late(seq, settings.timeouts.step_s)),
         }
     }
 

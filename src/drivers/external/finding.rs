@@ -51,7 +51,7 @@ problems! {
     NotReached = "not_reached": Crash,
         "avastra connects and starts nothing: start the program that listens there first";
     NoAnswer = "no_answer": Timeout,
-        "flush standard output after each line; if the program needs longer, raise `timeouts` in its profile";
+        "flush standard output after each line; if the program needs longer, or the machine is busy, raise `timeouts` in its profile";
     NotJson = "not_json": Protocol,
         "print nothing but messages on standard output: send prints, also those of libraries, to standard error";
     TooLong = "too_long": Protocol, "a line has at most 1 MiB: send fewer points";

@@ -3,7 +3,7 @@
 //! All reading and writing is non-blocking, in one place and on the caller's thread, so a question costs two
 //! switches between processes and no thread can be left behind. Lines and standard error are bounded, whatever comes.
 //! This is the one file of the layer that asks the clock: for time limits, which decide nothing but that an answer is
-//! missing; what follows from a missing answer is in the log.
+//! missing, and for how long an answer took; what follows from a missing answer is in the log.
 
 use std::collections::BTreeSet;
 use std::io::{ErrorKind, Read, Write};
@@ -67,6 +67,11 @@ pub struct Deadline(Instant);
 impl Deadline {
     pub fn after(limit_s: f64) -> Deadline {
         Deadline(now() + Duration::from_secs_f64(limit_s))
+    }
+
+    /// How long ago it was so long before the deadline, s.
+    pub fn taken_s(self, limit_s: f64) -> f64 {
+        limit_s + now().saturating_duration_since(self.0).as_secs_f64() - self.left().as_secs_f64()
     }
 
     fn left(self) -> Duration {

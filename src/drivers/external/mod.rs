@@ -16,6 +16,7 @@ mod record;
 mod schema;
 mod session;
 mod settings;
+mod thinking;
 mod words;
 
 pub use driver::External;
@@ -27,3 +28,4 @@ pub use record::{Attached, Conversation, Key, Outcome, RecordError, digest_of, f
 pub use sequences::odd_orders;
 pub use session::Identity;
 pub use settings::{ExternalError, ExternalSettings, OnTimeout, Target, Timeouts};
+pub use thinking::Thinking;

@@ -13,6 +13,7 @@ use super::question;
 use super::record::{Attached, Conversation, Key, Outcome};
 use super::session::{Identity, Session};
 use super::settings::ExternalSettings;
+use super::thinking::{Thinking, Thoughts};
 
 /// Most memory for answers that are kept, bytes: an episode of trajectories with a thousand points has some 30 MB.
 const KNOWN_BYTES_MAX: usize = 128 << 20;
@@ -35,6 +36,7 @@ pub struct Program {
     missed: AtomicU64,
     cut_off: AtomicU64,
     unreached: Mutex<Unreached>,
+    thoughts: Mutex<Thoughts>,
     /// How its answers differed when it was asked the same again, if they ever did.
     otherwise: OnceLock<String>,
 }
@@ -95,6 +97,7 @@ impl Program {
             missed: AtomicU64::new(0),
             cut_off: AtomicU64::new(0),
             unreached: Mutex::default(),
+            thoughts: Mutex::default(),
             otherwise: OnceLock::new(),
         })
     }
@@ -131,6 +134,17 @@ impl Program {
     /// Steps that were not answered in time, in mode `hold`, since avastra was started.
     pub fn missed(&self) -> u64 {
         self.missed.load(Ordering::Relaxed)
+    }
+
+    /// Notes how long a process took for the answer to a step, s.
+    pub(super) fn thought(&self, took_s: f64) {
+        let ExternalSettings { period_s, timeouts, .. } = &self.settings;
+        locked(&self.thoughts).add(took_s, *period_s, timeouts.step_s);
+    }
+
+    /// How long it thought, since avastra was started; `None` if it was not asked.
+    pub fn thinking(&self) -> Option<Thinking> {
+        locked(&self.thoughts).told()
     }
 
     /// Notes that an answer asked for more than any vehicle can do.

@@ -161,6 +161,14 @@ impl Attached {
         digest(essence.to_string().as_bytes())
     }
 
+    /// Its name without the version, or what was started.
+    pub fn title(&self) -> String {
+        match &self.identity {
+            Some(identity) => identity.name.clone(),
+            None => format!("`{}`", self.settings.command.text()),
+        }
+    }
+
     /// Its name and version, or what was started.
     pub fn name(&self) -> String {
         match &self.identity {

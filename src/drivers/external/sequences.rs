@@ -10,7 +10,7 @@ use super::follow::Follower;
 use super::message::{Event, Question};
 use super::program::Program;
 use super::question;
-use super::session::Session;
+use super::session::{Patience, Session};
 use super::settings::Timeouts;
 
 /// Tries each order with the first moment of an episode, until one fails. Returns what was tried, in words. No process may be
@@ -131,9 +131,7 @@ impl Lines {
     }
 
     fn step(&self, session: &mut Session, line: &str) -> Result<(), Failure> {
-        match session.step(line, (0, 0), self.limits.step_s)? {
-            Some(_) => Ok(()),
-            None => Err(session.too_late(0, self.limits.step_s)),
-        }
+        let patience = Patience { limit_s: self.limits.step_s, is_graceful: true };
+        session.step(line, (0, 0), patience).map(drop)
     }
 }

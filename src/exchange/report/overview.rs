@@ -2,7 +2,9 @@
 
 use serde_json::{Value, json};
 
-use avastra_campaign::run::{Database, DatabaseError, HeatMap, Profile, TrafficRecord};
+use avastra_campaign::estimate::FRAME;
+use avastra_campaign::oracle::MIXED;
+use avastra_campaign::run::{Database, DatabaseError, HeatMap, Profile, RequirementCount, TrafficRecord};
 use avastra_drivers::external::Attached;
 use avastra_world::action::ActionTable;
 
@@ -28,10 +30,34 @@ pub fn of_run(
         "heat": heat,
         "kind": if learning.is_empty() { "run" } else { "training" },
         "settings": settings, "conditions": conditions(settings), "totals": totals, "simulated_h": simulated_s / 3600.0,
+        "requirements": requirements(database, table)?, "mixed": mixed(settings),
         "groups": database.groups()?, "refusals": database.refusals()?, "failures": database.failures()?,
         "rows": rows, "coverage": database.coverage()?, "learning": learning,
         "evaluation": results.map(|results| &results["evaluation"]),
     }))
+}
+
+/// The requirements that were in force, each with what it asks where the space can be read.
+fn requirements(database: &Database, table: Option<&ActionTable>) -> Result<Vec<Value>, DatabaseError> {
+    let declared = |name: &str| table?.space().requirements.iter().find(|of| of.name == name);
+    let told = |of: RequirementCount| {
+        let def = declared(&of.requirement);
+        let mut told = json!(of);
+        told["formula"] = json!(def.map(|def| &def.formula));
+        told["docs"] = json!(def.map(|def| def.docs.join(" ")));
+        told
+    };
+    Ok(database.requirements()?.into_iter().map(told).collect())
+}
+
+/// What is added to recurrences where the driving system says that it is not deterministic.
+fn mixed(settings: &str) -> Option<&'static str> {
+    #[derive(serde::Deserialize)]
+    struct Driver {
+        external: Option<Attached>,
+    }
+    let driver = serde_yaml::from_str::<Driver>(settings).ok()?;
+    driver.external.filter(|attached| !attached.is_deterministic()).map(|_| MIXED)
 }
 
 /// A study's results, as its `results.json` has them.
@@ -41,7 +67,9 @@ pub fn of_study(results: &Value, settings: &str) -> Value {
 
 /// An estimate's results, as its `results.json` has them.
 pub fn of_estimate(results: &Value, settings: &str) -> Value {
-    json!({ "kind": "estimate", "settings": settings, "conditions": conditions(settings), "estimate": results })
+    json!({
+        "kind": "estimate", "settings": settings, "conditions": conditions(settings), "estimate": results, "frame": FRAME,
+    })
 }
 
 /// The traffic profile of runs that ask for none.
@@ -75,10 +103,7 @@ fn conditions(settings: &str) -> Vec<(&'static str, String)> {
         },
     };
     // A profile of the author's own is told by what it changes.
-    let manners = of.traffic.map(|TrafficRecord { settings, .. }| {
-        settings.shipped_as().map_or_else(|| settings.to_line(), str::to_owned)
-    });
-    let manners = manners.unwrap_or_else(|| CAREFUL.to_owned());
+    let manners = of.traffic.as_ref().map(TrafficRecord::in_words).unwrap_or_else(|| CAREFUL.to_owned());
     let traffic = if of.ambient == 0 { manners } else { format!("{manners}, {} ambient", of.ambient) };
     let known = [
         ("Space", Some(of.space)),

@@ -128,7 +128,7 @@ impl Page {
     }
 }
 
-/// The larger, the worse: whether something of it counts, whether that is no fluke, and how fast the impact was beside what
+/// The larger, the worse: whether something of it counts, whether one of that recurs, and how fast the impact was beside what
 /// people bear, 0 without a collision.
 fn badness(summary: &Value) -> (bool, bool, f64) {
     let all = |name: &str| summary[name].as_array().map_or(&[][..], Vec::as_slice);
@@ -137,7 +137,7 @@ fn badness(summary: &Value) -> (bool, bool, f64) {
         of_collisions.chain(all("breaches").iter().map(|breach| (true, breach))).collect();
     let counts = findings.iter().any(|(counts, _)| *counts);
     let meant = || findings.iter().filter(|found| found.0 == counts).map(|(_, finding)| finding);
-    let recurs = meant().any(|finding| finding["recurrence"]["fluke"] != true);
+    let recurs = meant().any(|finding| finding["recurrence"]["recurs"] != false);
     let harm = meant().filter_map(|finding| finding["harm_share"].as_f64()).fold(0.0, f64::max);
     (counts, recurs, harm)
 }

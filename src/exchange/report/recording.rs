@@ -278,7 +278,7 @@ fn collision(
         }
         _ => None,
     });
-    let recurrence = recurrence(scenario, |requirement, obstacle| {
+    let recurrence = recurrence((scenario, log), |requirement, obstacle| {
         requirement.is_none() && obstacle.is_none_or(|named| named.number == contact.obstacle)
     });
     json!({
@@ -298,16 +298,17 @@ fn collision(
 /// What the ego vehicle did not keep, and which careful drivers would have, as the file claims.
 fn breaches(table: &ActionTable, scenario: &Scenario, log: &EpisodeLog) -> Vec<Value> {
     let told = |breach: &Breach| {
-        let RequirementDef { name, docs, margin, .. } = &table.space().requirements[breach.requirement];
+        let RequirementDef { name, docs, formula, margin, .. } =
+            &table.space().requirements[breach.requirement];
         let kept_by = scenario.claims.iter().find_map(|claim| match claim {
             Claim::Kept { requirement, by } if requirement == name => Some(by),
             _ => None,
         });
         let unit = margin.map(|dimension| dimension.si_unit());
         json!({
-            "requirement": name, "obstacle": breach.obstacle, "docs": docs.join(" "), "at_s": breach.time_s, "until_s": breach.until_s,
+            "requirement": name, "obstacle": breach.obstacle, "docs": docs.join(" "), "formula": formula, "at_s": breach.time_s, "until_s": breach.until_s,
             "margin": breach.margin.map(rounded), "unit": unit, "kept_by": kept_by,
-            "recurrence": recurrence(scenario, |requirement, _| requirement == Some(name)),
+            "recurrence": recurrence((scenario, log), |requirement, _| requirement == Some(name)),
         })
     };
     log.breaches.iter().map(told).collect()
@@ -340,7 +341,7 @@ fn margins(table: &ActionTable, log: &EpisodeLog, all: &[MarginSeries], columns:
 
 /// How often a finding recurs, as the file claims of the one that is meant.
 fn recurrence(
-    scenario: &Scenario,
+    (scenario, log): (&Scenario, &EpisodeLog),
     is_meant: impl Fn(Option<&str>, Option<Obstacle>) -> bool,
 ) -> Option<Value> {
     scenario.claims.iter().find_map(|claim| match claim {
@@ -348,7 +349,12 @@ fn recurrence(
             if is_meant(requirement.as_deref(), *obstacle) =>
         {
             let found = Recurrence { recurred: *recurred, replays: *replays };
-            Some(json!({ "recurred": recurred, "replays": replays, "text": found.to_string(), "fluke": found.is_fluke() }))
+            let program = log.conversation.as_deref().map(|conversation| &conversation.attached);
+            let mixed = program.filter(|attached| !attached.is_deterministic()).map(|_| oracle::MIXED);
+            Some(json!({
+                "recurred": recurred, "replays": replays, "text": found.to_string(), "recurs": found.recurs(),
+                "word": found.word(mixed.is_some()), "mixed": mixed,
+            }))
         }
         _ => None,
     })

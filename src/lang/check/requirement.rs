@@ -10,7 +10,7 @@ use crate::model::requirement::{margin_dimension, open_divisor, past_inside};
 use crate::model::vocabulary::{BEGINS, BREACHED, EVENTS, MARGIN, NearWord, PastWord, Site, Word, things};
 use crate::model::{BodyWord, RequirementDef, RuleDef, TICK_MS, Type, code};
 use crate::syntax::ast::{ItemKind, Span};
-use crate::syntax::{Diagnostic, ast};
+use crate::syntax::{Diagnostic, ast, print_item};
 use avastra_base::units::{Dimension, Rational};
 
 /// The most requirements of a space: a set of them fits one integer, and each is judged at every tick.
@@ -116,6 +116,7 @@ impl Checker {
         Some(RequirementDef {
             name: declared.name.text.clone(),
             docs: docs(item),
+            formula: print_item(&item.kind).split_whitespace().collect::<Vec<_>>().join(" "),
             optional: declared.optional,
             on: on.into_iter().collect::<Option<Vec<_>>>()?.concat(),
             margin: margin_dimension(&condition),

@@ -553,6 +553,8 @@ pub struct RuleBinding {
 pub struct RequirementDef {
     pub name: String,
     pub docs: Vec<String>,
+    /// What it says, in one line of the language, for those who read what came of it.
+    pub formula: String,
     /// Off unless `--with` names it.
     pub optional: bool,
     /// The bodies of the road users that it is about: it is asked of each that is near, by itself. Empty if it is about the

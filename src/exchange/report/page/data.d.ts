@@ -45,8 +45,13 @@ export interface Summary {
 export interface Recurrence {
   recurred: number;
   replays: number;
+  /** `14 of 20 (0.48 to 0.85)`. */
   text: string;
-  fluke: boolean;
+  recurs: boolean;
+  /** `recurs`, `may recur` or `rarely recurs`. */
+  word: string;
+  /** Said where the driving system need not repeat itself. */
+  mixed: string | null;
 }
 
 /** A collision of the list. */
@@ -104,6 +109,7 @@ export interface Breach {
   requirement: string;
   obstacle: number | null;
   docs: string;
+  formula: string;
   at_s: number;
   until_s: number;
   margin: number | null;

@@ -9,9 +9,14 @@ const EVENTS = { counted: "a collision that counts", collision: "a collision", b
 const bounds = (found) => (found ? ` [${short(found.low)}, ${found.high === null ? "∞" : short(found.high)}]` : "");
 const withBounds = (value, found) => (value === null ? "–" : `${short(value)}${bounds(found)}`);
 
-/** The whole estimate. */
-export function estimate(results) {
-  const { event, parts, parts_wanted: wanted, roads, together, mass } = results;
+const METHODS = {
+  count: "Method: counting; exact intervals after Clopper and Pearson.",
+  probe: "Method: dangerous rows are tried out beside those that chance chooses, and weighted; intervals after Fay and Feuer.",
+};
+
+/** The whole estimate; `frame` says what its rates are rates of. */
+export function estimate(results, frame) {
+  const { event, method, parts, parts_wanted: wanted, missed_goals: missed = [], roads, together, mass } = results;
   const all = together && roads.length > 1 ? [...roads, { road: "all roads", ...together }] : roads;
   const title = `Probability of an episode with ${EVENTS[event] ?? `a breach of ${event}`}`;
   const plotted = all.map((one) => [one.road, one.probability, one.interval.low, one.interval.high]);
@@ -36,6 +41,8 @@ export function estimate(results) {
     { class: "study", "aria-labelledby": "h-estimate" },
     el("h2", { id: "h-estimate" }, "How often"),
     parts < wanted && el("p", { class: "muted" }, `${parts} of ${wanted} parts were played.`),
+    missed.length > 0 && el("p", { class: "warning" }, `It missed its goals: ${missed.join("; ")}.`),
+    el("p", {}, `In 1000 km and in an hour: ${frame}. ${METHODS[method] ?? ""}`),
     el("div", { class: "grid" }, intervals(`${title}, with 95 % intervals`, plotted)),
     gain(together),
     table(`${title}; in brackets: 95 % intervals`, heads, rows),

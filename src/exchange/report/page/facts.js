@@ -42,7 +42,8 @@ export function showVerdict(place, recording, seek, watchDrivers) {
 function broken(breach, seek) {
   const jump = el("button", { type: "button", onclick: () => seek(breach.at_s) }, `Go to ${atTime(breach.at_s)}`);
   const rows = [
-    ["Required", breach.docs || breach.requirement],
+    ["Required", el("code", {}, breach.formula)],
+    ...(breach.docs ? [["In words", breach.docs]] : []),
     ["Broken", `from ${atTime(breach.at_s)} to ${atTime(breach.until_s)}`],
     ...again(breach),
   ];
@@ -66,7 +67,8 @@ function broken(breach, seek) {
 /** How often a finding happens again under other noise, if that was tried. */
 function again({ recurrence }) {
   if (!recurrence) return [];
-  return [["Under other noise", `recurs in ${recurrence.text}${recurrence.fluke ? ": a fluke" : ""}`]];
+  const { text, mixed } = recurrence;
+  return [["Under other noise", `recurs in ${text}${mixed ? `; ${mixed}` : ""}`]];
 }
 
 function verdict(recording, collision, seek, watchDrivers) {

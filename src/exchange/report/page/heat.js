@@ -20,7 +20,7 @@ export function heat(overview) {
       { class: "legend" },
       HEAT_ENDINGS.map((ending, at) => [el("span", { class: `heat-${at}` }, `${HEAT_SIGNS[at]} ${ending}`), " "]),
       "· ⚑ a requirement was breached · a near miss had a time to collision or a post-encroachment time below 1.5 s; a mitigated contact was at least 5 km/h slower than the speed before · with the " +
-        "mean speed at contacts",
+        "mean speed at contacts of the two against each other, in brackets that of the ego vehicle and what it lost",
     ),
     maps.map(heatMap),
   );
@@ -51,7 +51,7 @@ function heatMap({ action, down, across, rows, columns, cells }) {
 /** A cell has the colour of its worst ending, and says all of them. */
 function heatCell(tally) {
   if (!tally) return el("td", {}, "–");
-  const { endings, impact_mps: impact, reduction_mps: reduction, breached } = tally;
+  const { endings, relative_mps: relative, impact_mps: impact, reduction_mps: reduction, breached } = tally;
   const all = endings.reduce((sum, count) => sum + count, 0);
   // A breach without a contact is no clean drive.
   const worst = Math.max(
@@ -59,7 +59,9 @@ function heatCell(tally) {
     breached > 0 ? 2 : 0,
   );
   const told = HEAT_ENDINGS.map((ending, at) => endings[at] > 0 && `${endings[at]} ${ending}`).filter(Boolean);
-  const speeds = impact === null ? null : `${figure(impact * 3.6, "km/h", 0)} (−${figure(reduction * 3.6, "", 0)})`;
+  // An ego vehicle that stands is still hit at the speed of the other.
+  const [both, ego, lost] = [relative, impact, reduction].map((mps) => figure(mps === null ? null : mps * 3.6, "", 0));
+  const speeds = impact === null ? null : `${both} km/h (ego ${ego}, −${lost})`;
   const title = [`${plural(all, "test")}: ${told.join(", ")}`, breached > 0 && `${breached} with a breach`];
   const text =
     all === 1

@@ -174,10 +174,10 @@ function counts({ summary }, hit) {
   return summary.refuted.length > 0 ? `${end}, replays otherwise` : end;
 }
 
-/** Whether it counts, and whether it is a fluke. */
+/** Whether it counts, and whether it rarely recurs. */
 function rowClass(summary, hit) {
-  const isFluke = mainFinding(summary)?.recurrence?.fluke;
-  return [hit?.counted && "counted", isFluke && "fluke"].filter(Boolean).join(" ") || null;
+  const isRare = recursInWords(mainFinding(summary)) === "rarely recurs";
+  return [hit?.counted && "counted", isRare && "rare"].filter(Boolean).join(" ") || null;
 }
 
 /**
@@ -197,8 +197,8 @@ function listing(list) {
   });
   const heads = [["Scenario"], ...shown].map(([name, , kind]) => el("th", { scope: "col", class: kind }, name));
   const caption =
-    "Scenarios, worst first: those that count, then flukes after those that recur in more than half of their replays under " +
-    "other noise, then by the speed of the impact beside what people bear.";
+    "Scenarios, worst first: those that count, of these first those that recur under other noise (the 95 % interval of the " +
+    "share of replays lies above one half), then by the speed of the impact beside what people bear.";
   return el(
     "div",
     { class: "scroll", tabindex: "0", role: "region", "aria-label": "Scenarios, worst first" },
@@ -219,7 +219,7 @@ function listing(list) {
 function barCharts(list) {
   /** @type {[string, string, (entry: Entry) => string][]} */
   const charts = [
-    ["Kinds of failure", "group", kindOf],
+    ["Scenarios by kind of failure", "group", kindOf],
     ...FILTERS.filter(([name]) =>
       ["verdict", "recurs", "harm", "priority", "manoeuvre", "side", "cause", "change"].includes(name),
     ).map(([name, title, value]) => /** @type {[string, string, (entry: Entry) => string]} */ ([title, name, value])),

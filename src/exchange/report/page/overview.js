@@ -26,9 +26,11 @@ export function showOverview(place, data, missing = null) {
     overview && conditions(overview.conditions),
     missing && el("p", { class: "warning" }, `The link names a scenario that is not on this page: ${missing}.`),
     refuted(scenarios),
-    overview && overview.totals && totals(overview.totals, overview.simulated_h),
+    overview && overview.totals && totals(overview),
     compared(data),
     data.remarks.map((remark) => el("p", { class: "warning" }, remark)),
+    overview?.protocol && el("p", { class: "lead", id: "protocol" }, `Protocol: ${overview.protocol}.`),
+    overview && required(overview, scenarios),
     overview && results(overview),
     overview && heat(overview),
     scenarios.length > 0 &&
@@ -53,15 +55,18 @@ function results(overview) {
     run: () => null,
     training: () => [overview.evaluation && evaluation(overview.evaluation), learning(overview.learning)],
     study: () => study(overview.study),
-    estimate: () => estimate(overview.estimate),
+    estimate: () => estimate(overview.estimate, overview.frame),
   };
   return of[overview.kind]();
 }
 
 /** Why there is no scenario. */
 function nothingShown(overview) {
-  const isCalm = overview?.totals?.counted === 0 && overview.totals.failed === 0;
-  return isCalm ? "No scenario was written: nothing that counts happened." : "None of the scenarios can be shown here.";
+  const sums = overview?.totals;
+  const isCalm = sums?.counted === 0 && sums.failed === 0 && sums.episodes_with_breach === 0;
+  return isCalm
+    ? "No scenario was written: nothing that counts happened. `avastra run --keep 3` keeps the nearest misses to look at."
+    : "None of the scenarios can be shown here.";
 }
 
 /** `Run 0001`, or what there is without one. */
@@ -121,7 +126,11 @@ function evaluation(found) {
   );
 }
 
-function totals(sums, simulatedH) {
+function totals({ totals: sums, simulated_h: simulatedH, requirements, mixed }) {
+  const broken = requirements.filter((of) => of.breaches > 0);
+  const breaches = broken.reduce((sum, of) => sum + of.breaches, 0);
+  // A red light is no counted collision and, without a requirement that says so, no breach.
+  const isGood = sums.counted === 0 && breaches === 0 && sums.red_runs === 0 && sums.failed === 0;
   const tile = (value, name, kind) =>
     el("div", { class: `tile ${kind ?? ""}` }, el("dd", {}, value), el("dt", {}, name));
   const ends = [
@@ -143,7 +152,13 @@ function totals(sums, simulatedH) {
     el(
       "dl",
       { class: "tiles" },
-      tile(sums.counted, "collisions that count", sums.counted > 0 ? "bad" : "good"),
+      tile(sums.counted, "collisions that count", sums.counted > 0 ? "bad" : isGood ? "good" : ""),
+      requirements.length > 0 &&
+        tile(
+          breaches,
+          `breaches, of ${broken.length} of ${plural(requirements.length, "requirement")}`,
+          breaches > 0 ? "bad" : isGood ? "good" : "",
+        ),
       tile(sums.collisions, "collisions in all"),
       tile(sums.episodes, "episodes"),
       tile(figure(sums.driven_m / 1000, "km", 1), "driven"),
@@ -157,11 +172,56 @@ function totals(sums, simulatedH) {
         `only one without delay ${sums.beyond_reference}, none ${sums.unavoidable}; the ego vehicle had priority in ` +
         `${sums.wronged}, the other in ${sums.wrong}.` +
         (sums.replayed > 0
-          ? ` Of ${plural(sums.replayed, "finding")} played again under other noise, ${sums.recurring} recur in more than half ` +
-            `of the replays, ${sums.replayed - sums.recurring} are flukes.`
+          ? ` Of ${plural(sums.replayed, "finding")} played again under other noise, ${sums.recurring} recur: the 95 % interval ` +
+            `of the share of replays lies above one half${mixed ? `; ${mixed}` : ""}.`
+          : "") +
+        (sums.red_unkept > 0
+          ? ` ${plural(sums.red_unkept, "episode")} with a red light passed kept as no scenario: nothing of the space asks about it.`
           : ""),
     ),
   );
+}
+
+/** Every requirement in force: what it asks, whether it was kept and by how much, and for how long it was asked at all. */
+function required({ requirements }, scenarios) {
+  if (!requirements || requirements.length === 0) return null;
+  const rows = requirements.map((of) => [
+    el("details", {}, el("summary", {}, of.requirement), of.formula && el("code", {}, of.formula), of.docs && el("p", {}, of.docs)),
+    verdictOf(of),
+    of.breaches > 0 ? `${of.breaches} in ${plural(of.breached_in, "episode")}` : "0",
+    of.tried_in > 0 ? `${of.kept_in} of ${of.tried_in}` : "–",
+    marginOf(of),
+    of.asked_in > 0 ? `${figure(of.asked_s, "s", 1)} in ${plural(of.asked_in, "episode")}` : "never asked",
+    exampleOf(of, scenarios),
+  ]);
+  const heads = ["Requirement", "Result", "Breaches", "Episodes kept by a careful driver", "Margin", "Asked", "Example"];
+  return el(
+    "section",
+    { "aria-labelledby": "h-required", id: "required" },
+    el("h2", { id: "h-required" }, "Requirements"),
+    table("What the ego vehicle must keep; a click on a name shows the formula", heads, rows),
+  );
+}
+
+/** In a word. What was never asked is not kept. */
+function verdictOf({ breaches, asked_in: askedIn, smallest, unit }) {
+  if (breaches > 0) return el("strong", { class: "bad" }, "breached");
+  if (askedIn === 0) return "never asked";
+  return unit !== null && smallest === null ? "not breached" : "kept";
+}
+
+/** How far it was broken, or how near it came to that. */
+function marginOf({ breaches, smallest, unit }) {
+  if (smallest === null || unit === null) return "–";
+  const text = figure(Math.abs(smallest), unit, 2).trim();
+  return breaches > 0 ? `broken by up to ${text}` : `kept by at least ${text}`;
+}
+
+/** The scenario of the worst breach, if it is on the page. */
+function exampleOf({ scenario }, scenarios) {
+  if (!scenario) return "–";
+  const entry = scenarios.find((one) => one.summary.name === scenario);
+  return entry ? el("a", { href: linkOf({ s: nameOf(entry) }) }, scenario) : scenario;
 }
 
 function learning(points) {

@@ -69,13 +69,13 @@ export const mainFinding = (summary) => {
 };
 
 /**
- * Whether a finding is more than one draw of the noise.
+ * Whether a finding recurs under other noise, in the engine's words.
  * @param {{ recurrence: Recurrence | null } | null} finding
  */
 export function recursInWords(finding) {
   const recurrence = finding?.recurrence;
   if (!recurrence) return "not tried";
-  return recurrence.fluke ? "fluke" : "recurs";
+  return recurrence.word;
 }
 
 /** What an impact means for people, by the word of the page's data. */

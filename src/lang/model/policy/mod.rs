@@ -54,6 +54,9 @@ pub struct PolicyOrigin {
     /// Digest of all settings of the driving system; `None` if it was given none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile_digest: Option<String>,
+    /// How other vehicles drove, if not as they usually do: the name of a profile, or its settings in one line.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traffic: Option<String>,
     pub engine: String,
     pub avastra: String,
     #[serde(default)]
