@@ -72,7 +72,7 @@ impl Worth {
                     impact_mps: Some(severity.closing_speed_mps),
                     harm: Some(severity.harm.name()),
                     kind: Some(collision.kind.name()),
-                    priority: Some(collision.contact.priority.name()),
+                    priority: Some(collision.contact.ruling.priority.name()),
                     margin: None,
                     recurrence,
                 }
