@@ -65,7 +65,8 @@ pub(crate) const LAYOUT: Layout = Layout {
     ],
 };
 
-/// `step.top_speed_mps` is the ego vehicle's greatest speed in the step before the first contact, NULL after it.
+/// `step.top_speed_mps` is the ego vehicle's greatest speed in the step before the first contact, NULL after it;
+/// `step.others_crashed` whether other road users crashed into each other in it.
 /// `held` says what held the speed of the ego vehicle back, from the row's time to that of the next row. `offer`
 /// counts, per episode and row, the steps in which the row was legal (`reason` 0) or refused (other reasons); training
 /// writes nothing there. `breach.kept_by` has the careful drivers that keep the
@@ -383,7 +384,8 @@ impl Database {
                         coalesce(sum(ended = 'blocked'), 0), (SELECT count(*) FROM failure),
                         coalesce(sum(ended = 'astray'), 0), coalesce(sum(ended = 'left_the_map'), 0),
                         (SELECT count(DISTINCT episode) FROM breach),
-                        (SELECT count(replays) FROM finding), (SELECT coalesce(sum(2 * recurred > replays), 0) FROM finding)
+                        (SELECT count(replays) FROM finding), (SELECT coalesce(sum(2 * recurred > replays), 0) FROM finding),
+                        (SELECT count(DISTINCT episode) FROM step WHERE others_crashed)
                  FROM episode",
             [],
             |row| {
@@ -394,7 +396,7 @@ impl Database {
                         episodes, collisions, counted, episodes_with_collision, episodes_with_counted, arrived,
                         stalled, step_limit, simulated_s, driven_m, red_runs, first_counted_s_mean, sudden,
                         struck, repeated, avoidable, beyond_reference, unavoidable, branched_s, wronged, wrong,
-                        blocked, failed, astray, left_map, episodes_with_breach, replayed, recurring,
+                        blocked, failed, astray, left_map, episodes_with_breach, replayed, recurring, others_crashed,
                     }
                 );
                 Ok(totals)
@@ -490,6 +492,8 @@ pub struct Totals {
     /// Collisions in which the ego vehicle had priority, and in which the other had; the rest is neither.
     pub wronged: i64,
     pub wrong: i64,
+    /// Episodes in which other road users crashed into each other.
+    pub others_crashed: i64,
 }
 
 fn step_table() -> String {
@@ -502,7 +506,7 @@ fn step_table() -> String {
            action_row INTEGER, action TEXT, refused TEXT, states TEXT, proc REAL NOT NULL, reward REAL NOT NULL,
            ttc_s REAL, thw_s REAL, drac_mps2 REAL, required_mps2 REAL, rss_unsafe_s REAL,
            top_speed_mps REAL,
-           {}, PRIMARY KEY (episode, step)) STRICT;",
+           {}, others_crashed INTEGER NOT NULL, PRIMARY KEY (episode, step)) STRICT;",
         states.join(", ")
     )
 }
@@ -549,6 +553,7 @@ pub(crate) fn add_all(
             summary.top_speeds_mps.get(index).copied().flatten().into(),
         ]);
         values.extend(step.state.iter().map(|&value| f64::from(value).into()));
+        values.push(log.others_crashed_in(index).into());
         let places = vec!["?"; values.len()].join(", ");
         transaction
             .prepare_cached(&format!("INSERT INTO step VALUES ({places})"))?

@@ -201,6 +201,8 @@ pub struct NpcFacts {
     /// Where it is along the trajectory that it follows; 0 if it follows none.
     pub station_m: f64,
     pub has_siren: bool,
+    /// Whether it and another one than the ego vehicle have crashed into each other. Known only of who is there.
+    pub crashed: bool,
     /// Whether it is the one ahead of the ego vehicle, in which lane to the left of that one's it is, and how far off the road, m:
     /// known only to who watches.
     pub leads: bool,

@@ -318,7 +318,8 @@ impl World {
     pub fn npc_facts(&self, id: u32) -> Option<NpcFacts> {
         let user = self.users.iter().find(|user| user.obstacle.id == id)?;
         let facts = npc_facts(&self.alone(), &user.obstacle, &user.mover.motion);
-        Some(NpcFacts { priority: user.mover.rights.now(self.ticks), ..facts })
+        let (priority, crashed) = (user.mover.rights.now(self.ticks), user.mover.has_crashed());
+        Some(NpcFacts { priority, crashed, ..facts })
     }
 
     /// Whether the road user with an id ignores a rule of the road; false if it is not there, or on foot.
