@@ -55,3 +55,4 @@ mod trials;
 mod verdicts;
 mod wishes;
 mod world;
+mod written;

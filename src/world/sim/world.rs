@@ -353,6 +353,11 @@ impl World {
         progress.is_some_and(|progress| progress.meets(command))
     }
 
+    /// By how much the road user with an id missed the moment of its last `early`, s; below 0 if it was too soon.
+    pub fn late_s(&self, id: u32) -> Option<f64> {
+        self.users.iter().find(|user| user.obstacle.id == id)?.mover.late_s()
+    }
+
     /// The id of the latest bearer of a name, if one is there.
     pub fn bearer_id(&self, who: usize) -> Option<u32> {
         Some(self.users[self.bearer(who)?].obstacle.id)
