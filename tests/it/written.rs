@@ -136,6 +136,21 @@ fn a_requirement_may_ask_whether_somebody_has_crashed() {
     assert_eq!(code, 0, "{said}{errors}");
 }
 
+#[test]
+fn a_step_that_never_happens_can_be_looked_at() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().display().to_string();
+    let export =
+        |format: &str| outcome(&mut avastra(&["export", "--to", format, "--out", &out, &case("tnever")]));
+    let why = "step 0 does not happen: `once ego.speed >= 60 m/s` did not come within the step";
+    let (code, said, errors) = export("csv");
+    assert!(code == 0 && errors.contains(why), "{code}: {said}{errors}");
+    assert!(read(scratch.path(), "tnever.csv").lines().count() > 400, "the whole step is there");
+    // Another tool is not told of what does not happen.
+    let (code, said, errors) = export("openscenario");
+    assert!(code == 3 && said.contains(why), "{code}: {said}{errors}");
+}
+
 fn read(folder: &Path, name: &str) -> String {
     std::fs::read_to_string(folder.join(name)).expect("it was written")
 }
