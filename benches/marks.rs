@@ -139,6 +139,7 @@ fn crowded(scene: &Arc<Scene>) -> World {
                     waits_s: None,
                     early_s: None,
                     behind_first_m: 0.0,
+                    first_m: None,
                     siren: false,
                     turn: None,
                     lights: ShownLights::Off,

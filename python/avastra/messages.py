@@ -362,6 +362,8 @@ class Acceleration:
 
     accel: float
     internal: Optional[Internal] = None
+    #: What is to become of the route's next lane change: "wait" or "go"; without it avastra looks whether there is room.
+    lane_change: Optional[str] = None
 
 
 @dataclass(frozen=True)

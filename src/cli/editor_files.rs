@@ -109,6 +109,7 @@ fn names(entries: &[Entry]) -> Vec<&'static str> {
 
 fn one_of(mut words: Vec<&str>) -> String {
     words.sort_unstable();
+    words.dedup();
     format!(r"\b({})\b", words.join("|"))
 }
 

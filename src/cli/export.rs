@@ -40,14 +40,25 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
             Err(ExportError::Run(error)) => return Err(error.into()),
             Err(error @ ExportError::Refuted { .. }) => {
                 let written = Err(error.to_string());
-                return Ok(Exported { file: file.clone(), written, left_out: Vec::new() });
+                return Ok(Exported {
+                    file: file.clone(),
+                    written,
+                    left_out: Vec::new(),
+                    refused: Vec::new(),
+                });
             }
         };
+        // Of what does not happen as it is written, no other tool is told; whoever looks for the reason needs the table.
+        if !recording.refused.is_empty() && arguments.to != ExportFormat::Csv {
+            let written = Err(format!("it does not replay: {}", recording.refused.join("; ")));
+            return Ok(Exported { file: file.clone(), written, left_out: Vec::new(), refused: Vec::new() });
+        }
         let (written, left_out) = write_all(arguments, &recording, &targets[file], &maps)?;
-        Ok(Exported { file: file.clone(), written: Ok(written), left_out })
+        Ok(Exported { file: file.clone(), written: Ok(written), left_out, refused: recording.refused })
     })?;
     let mut refuted = 0;
-    for Exported { file, written, left_out } in &exported.done {
+    for Exported { file, written, left_out, refused } in &exported.done {
+        refused.iter().for_each(|step| output.warn(&format!("{}: {step}", file.display())));
         if !left_out.is_empty() {
             output.aside(&format!("{}: left out: {}", file.display(), left_out.join("; ")));
         }
@@ -84,6 +95,8 @@ struct Exported {
     written: Result<Vec<PathBuf>, String>,
     /// What its player cannot be told.
     left_out: Vec<String>,
+    /// What does not happen in it, though it is written.
+    refused: Vec<String>,
 }
 
 /// Options that mean nothing for a format are mistakes.

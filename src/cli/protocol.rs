@@ -80,6 +80,9 @@ fn ended(test: &ProtocolTest) -> String {
     if !test.breached.is_empty() {
         let _ = write!(text, "; breached: {}", test.breached.join(", "));
     }
+    if test.others_crashed && ending != Ending::OthersCrashed {
+        text.push_str("; other road users crashed into each other");
+    }
     text
 }
 
@@ -92,7 +95,7 @@ fn csv(tests: &[ProtocolTest]) -> String {
         }
     }
     let mut text = format!(
-        "episode,road,action,{}ending,before_kmh,impact_kmh,reduction_kmh,relative_kmh,precrash,ttc_s,counted,breached,refused\n",
+        "episode,road,action,{}ending,before_kmh,impact_kmh,reduction_kmh,relative_kmh,precrash,ttc_s,counted,breached,refused,others_crashed\n",
         names.iter().map(|name| format!("{name},")).collect::<String>()
     );
     let figure = |value: Option<f64>, factor: f64| {
@@ -109,7 +112,7 @@ fn csv(tests: &[ProtocolTest]) -> String {
         };
         let _ = writeln!(
             text,
-            "{},{},{},{}{},{},{},{},{},{},{},{},{},{}",
+            "{},{},{},{}{},{},{},{},{},{},{},{},{},{},{}",
             test.episode,
             test.road,
             test.action.as_deref().unwrap_or_default(),
@@ -124,15 +127,20 @@ fn csv(tests: &[ProtocolTest]) -> String {
             test.counted,
             test.breached.join(" "),
             quoted(test.refused.as_deref().unwrap_or_default()),
+            test.others_crashed,
         );
     }
     text
 }
 
-/// The tests as JUnit XML: a contact or a breach is a failure, an action that did not happen is skipped.
+/// The tests as JUnit XML: a contact or a breach is a failure; an action that did not happen is skipped, and so is a test whose
+/// road users crashed into each other before it could show anything.
 fn junit(suite: &str, tests: &[ProtocolTest]) -> String {
     let failed = tests.iter().filter(|test| test.is_failed()).count();
-    let skipped = tests.iter().filter(|test| test.ending.is_none()).count();
+    let is_skipped = |test: &ProtocolTest| {
+        !test.is_failed() && test.ending.is_none_or(|ending| ending == Ending::OthersCrashed)
+    };
+    let skipped = tests.iter().filter(|test| is_skipped(test)).count();
     let counts =
         format!("tests=\"{}\" failures=\"{failed}\" errors=\"0\" skipped=\"{skipped}\"", tests.len());
     let mut text = format!(
@@ -141,10 +149,10 @@ fn junit(suite: &str, tests: &[ProtocolTest]) -> String {
     );
     let mut seen: BTreeMap<(&str, String), usize> = BTreeMap::new();
     for test in tests {
-        let element = match test.ending {
-            None => Some("skipped"),
-            Some(_) if test.is_failed() => Some("failure"),
-            Some(_) => None,
+        let element = match test {
+            _ if is_skipped(test) => Some("skipped"),
+            _ if test.is_failed() => Some("failure"),
+            _ => None,
         };
         let inside = element.map_or_else(String::new, |element| {
             format!("\n      <{element} message=\"{}\"/>\n    ", escaped(&ended(test)))
@@ -184,32 +192,40 @@ mod tests {
             counted: true,
             breached: vec!["keeps_gap".to_owned()],
             refused: None,
+            others_crashed: true,
         };
         let missed = ProtocolTest {
             action: None,
             values: Vec::new(),
             ending: None,
             refused: Some("no room".to_owned()),
+            others_crashed: false,
             ..test.clone()
         };
-        let tests = [test, missed];
+        let wrecked = ProtocolTest {
+            ending: Some(Ending::OthersCrashed),
+            impact_mps: None,
+            breached: Vec::new(),
+            ..test.clone()
+        };
+        let tests = [test, missed, wrecked];
         let table = csv(&tests);
         let lines: Vec<&str> = table.lines().collect();
-        assert_eq!(lines[0].matches(',').count(), 14);
+        assert_eq!(lines[0].matches(',').count(), 15);
         assert_eq!(
             lines[1],
-            "3,at_30,begin,30,\"a, b\",mitigated,36.000,18.000,18.000,18.000,24 lead vehicle moving at lower constant speed,0.000,true,keeps_gap,"
+            "3,at_30,begin,30,\"a, b\",mitigated,36.000,18.000,18.000,18.000,24 lead vehicle moving at lower constant speed,0.000,true,keeps_gap,,true"
         );
         let cases = junit("runs/<1>", &tests);
         roxmltree::Document::parse(&cases).expect("it is well-formed");
-        assert!(cases.contains("failures=\"1\"") && cases.contains("skipped=\"1\""), "{cases}");
+        assert!(cases.contains("failures=\"1\"") && cases.contains("skipped=\"2\""), "{cases}");
         assert!(
-            cases.contains("18.0 km/h less than before: 24 lead vehicle moving at lower constant speed; breached: keeps_gap"),
+            cases.contains("18.0 km/h less than before: 24 lead vehicle moving at lower constant speed; breached: keeps_gap; other road users crashed into each other"),
             "{cases}"
         );
-        assert!(in_words(&tests).contains("1 mitigated, 1 without an action, 2 with a breach"));
+        assert!(in_words(&tests).contains("1 mitigated, 1 others crashed, 1 without an action"));
         // An ego vehicle that stands, and is hit at 70 km/h, is not hit at 0 km/h.
-        let [mut stands, _] = tests;
+        let [mut stands, ..] = tests;
         (stands.impact_mps, stands.before_mps, stands.relative_mps) =
             (Some(0.0), Some(70.0 / 3.6), Some(70.0 / 3.6));
         assert!(

@@ -205,9 +205,11 @@ fn play(
             });
             let refused = log.refused().map(|(step, reason)| format!("\n  step {step} is refused: {reason}"));
             let refused: String = refused.collect();
+            let crashes = log.incidents_in_words(table.space());
+            let crashes: String = crashes.iter().map(|crash| format!("\n  {crash}")).collect();
             let breaches = breaches_text(table.space(), scenario, &log);
             format!(
-                "{name}: {collisions}, {} counted, {avoidable} avoidable{breaches}{failed}{refused}",
+                "{name}: {collisions}, {} counted, {avoidable} avoidable{breaches}{failed}{refused}{crashes}",
                 counted.unwrap_or(0)
             )
         }
@@ -215,11 +217,16 @@ fn play(
             let lines = log.collisions.iter().zip(&severities);
             let lines =
                 lines.map(|(collision, severity)| severity_text(table.space(), &log, collision, severity));
+            let crashes = log.incidents_in_words(table.space());
+            let crashes = crashes.into_iter().map(|crash| format!("  {crash}"));
             let failure =
                 log.failure.as_ref().map(|failure| format!("  it ends with {}", failure.in_words()));
-            lines.chain(failure).collect::<Vec<_>>().join("\n")
+            lines.chain(crashes).chain(failure).collect::<Vec<_>>().join("\n")
         }
     };
+    let crashes: Vec<_> = log.incidents.iter().map(|crash| {
+        serde_json::json!({ "at_s": crash.time_s, "obstacle": crash.obstacle, "other": crash.other })
+    }).collect();
     let is_same = if other.is_none() { stage.is_as_recorded(&log) } else { None };
     let banner = changed.map(|changed| changed.banner(is_same));
     let breach = |found: &Breach| {
@@ -234,7 +241,7 @@ fn play(
         "claims": claims, "end": log.end.name(), "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
         "reproducible": doubted.is_none(), "failure": log.failure.as_ref().map(|failure| failure.in_words()),
         "held": log.held.iter().map(|held| serde_json::json!({ "from_s": held.from_s, "by": held.text() })).collect::<Vec<_>>(),
-        "breaches": log.breaches.iter().map(breach).collect::<Vec<_>>(), "severities": severities, "priorities": priorities, "criticality": criticality, "pet_s": pet_s,
+        "breaches": log.breaches.iter().map(breach).collect::<Vec<_>>(), "crashes": crashes, "severities": severities, "priorities": priorities, "criticality": criticality, "pet_s": pet_s,
     });
     let has_ads_failed = other.is_some() && log.failure.is_some();
     let (path, name) = (path.to_owned(), scenario.name.clone());

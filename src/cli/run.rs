@@ -463,6 +463,10 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize, is_mixed: bool) -
             text.push_str(&format!("; {MIXED}"));
         }
     }
+    if totals.others_crashed > 0 {
+        let episodes = plural(totals.others_crashed as usize, "episode");
+        text.push_str(&format!("\nother road users crashed into each other in {episodes}"));
+    }
     if totals.red_runs > 0 {
         text.push_str(&format!("\n{} passed", plural(totals.red_runs as usize, "red light")));
     }

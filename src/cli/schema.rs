@@ -126,7 +126,7 @@ run
   requirements[] object a requirement in force: for how long it was asked (`asked_s`, `asked_in` episodes), `breaches`, `breached_in`, `tried_in` and `kept_in` (episodes with a breach; of these, those that careful drivers drove, and that one kept), the `smallest` margin in its `unit`, the `nearest` episode, a `scenario` with the worst breach of those that were written
   critical[] text scenarios with a counted collision or a breach, the surest and worst first
   found[] object an episode with a finding: `road`, `episode`, whether it has a counted collision or a breach (`critical`), what the rest is about (`finding`: `collision` or a requirement; one that recurs comes first), its `recurrence` (`recurred` of `replays`), its `harm`
-  tests[] object of `every-row`: an action that was carried out, or that was refused (why is `refused`; without an `ending`): `episode`, `road`, `action`, its `values`, its `ending` (`avoided`, `near`, `mitigated`, `hit`), speeds before and at the first contact (m/s) and its `precrash` type, the least `ttc_s`, whether a collision is `counted`, what was `breached`
+  tests[] object of `every-row`: an action that was carried out, or that was refused (why is `refused`; without an `ending`): `episode`, `road`, `action`, its `values`, its `ending` (`avoided`, `near`, `mitigated`, `hit`, `others_crashed`), speeds before and at the first contact (m/s) and its `precrash` type, the least `ttc_s`, whether a collision is `counted`, what was `breached`, whether other road users crashed into each other (`others_crashed`)
   tables[] text of `every-row`: the same as CSV and as JUnit XML
   thinking object? of a driving system of your own that was asked: `answers`, seconds by the wall clock (`median_s`, `most_of_99_s`, `most_s`), the share `beyond_period`, how many were `late`
   kept[] text with `--keep`: paths of episodes without a finding, the nearest misses first
@@ -228,7 +228,7 @@ replay
   policies[] object `file`, `policy` and the claims `refuted`, in words
   scenarios[] object `file`, `scenario`, what has `changed` since it was written, `ads`, `claims`, `end`, the \
     `failure` of a driving system of your own, whether it is `reproducible`; what its speed was `held` by, from when \
-    on; collisions and how hard they were; the `breaches` of requirements: which, from when to when, the smallest `margin`
+    on; collisions and how hard they were; the `crashes` of other road users into each other; the `breaches` of requirements: which, from when to when, the smallest `margin`
   FAILED
 diagnose
   causes[] object? `cause` (one or two modules, or none) and `count`

@@ -393,7 +393,7 @@ impl Suite<'_> {
         if let Some(kind) = claimed_failure(scenario) {
             let log = stage.play(&ads, &mut |_, _, _| {});
             return Ok(Outcome::Played(match log.failure.as_ref().map(AdsFailure::kind) {
-                None => Regression::Fixed,
+                None => Regression::Fixed { others_crash_s: log.others_crash_s() },
                 Some(found) if found == kind => Regression::FailsAgain(kind),
                 Some(found) => Regression::AdsFailed(found),
             }));
@@ -414,7 +414,7 @@ impl Suite<'_> {
                 let otherwise = match again.failure.as_ref().map(AdsFailure::kind) {
                     Some(kind) => Regression::AdsFailed(kind),
                     None if !stage.counted(&ads, &again).is_empty() => Regression::OtherCrash,
-                    None => Regression::Fixed,
+                    None => Regression::Fixed { others_crash_s: again.others_crash_s() },
                 };
                 (breached_by(&again), otherwise)
             }
@@ -439,7 +439,7 @@ impl Suite<'_> {
             None => Regression::OtherCrash,
         };
         let again = match found {
-            Regression::Fixed | Regression::NeverMet if is_breached => breached_again().0,
+            Regression::Fixed { .. } | Regression::NeverMet if is_breached => breached_again().0,
             _ => None,
         };
         Ok(again.unwrap_or_else(|| self.outcome(found)))
@@ -556,7 +556,10 @@ impl Outcome {
                 ("still fails", format!("the same obstacle is hit at {time_s:.2} s"))
             }
             Regression::FailsAgain(kind) => ("still fails", format!("{} again", kind.name())),
-            Regression::Fixed => ("fixed", String::new()),
+            Regression::Fixed { others_crash_s } => {
+                let crash = |time_s| format!("but other road users crash into each other at {time_s:.2} s");
+                ("fixed", others_crash_s.map_or_else(String::new, crash))
+            }
             Regression::OtherCrash => ("changed", format!("another obstacle is hit{more}")),
             Regression::NotCounted { time_s } => {
                 let how = format!("the same obstacle is hit at {time_s:.2} s, and it does not count");
@@ -653,7 +656,7 @@ mod tests {
         };
         let cases = [
             case("a", Outcome::Played(Regression::StillFails { time_s: 14.221 })),
-            case("b", Outcome::Played(Regression::Fixed)),
+            case("b", Outcome::Played(Regression::Fixed { others_crash_s: None })),
             case("c", Outcome::Played(Regression::OtherCrash)),
             case("d", Outcome::Played(Regression::NeverMet)),
             case("f", Outcome::Played(Regression::NotCounted { time_s: 3.0 })),

@@ -3,8 +3,8 @@
 
 use avastra_lang::model::vocabulary::{
     BEGINS, Body, Colour, CommandField, EpisodeField, LaneChoice, LightColour, LightField, NearWord,
-    PastWord, ROAD_USER, RoadField, SINCE, ShownLights, Side, Site, SpawnField, StartField, TYPES, Then,
-    TrafficRule, Turning, Verb, Word,
+    NumberWord, PastWord, ROAD_USER, RoadField, SINCE, ShownLights, Side, Site, SpawnField, StartField,
+    TYPES, Then, TrafficRule, Turning, Verb, Word,
 };
 use avastra_lang::model::{DRIVERS, ENDS, MODULES};
 
@@ -31,7 +31,13 @@ pub fn facts(site: Site) -> Vec<Entry> {
     } else {
         Vec::new()
     };
-    facts.chain(words).filter(|(name, _)| !name.contains('.')).chain(since).chain(past).collect()
+    facts
+        .chain(words)
+        .filter(|(name, _)| !name.contains('.'))
+        .chain(since)
+        .chain(past)
+        .chain(of::<NumberWord>())
+        .collect()
 }
 
 /// The words for a field of a spawn; `body` is what stands before `ahead` or `behind`.

@@ -58,3 +58,4 @@ mod trials;
 mod verdicts;
 mod wishes;
 mod world;
+mod written;

@@ -36,6 +36,7 @@ fn walks_ahead(side: Side, distance_m: f64, speed_mps: f64, cover: Option<Body>)
         waits_s: None,
         early_s: None,
         behind_first_m: 0.0,
+        first_m: None,
         siren: false,
         turn: None,
         lights: ShownLights::Off,

@@ -190,11 +190,30 @@ scenario told {
   steps { 0: nothing() 2: wait() }
 }
 ";
-    let loaded = loaded("scenarios/told.ava", TOLD);
+    page_told("scenarios/told.ava", TOLD)
+}
+
+/// The page of a scenario of this text, which stands at a path.
+fn page_told(path: &str, text: &str) -> String {
+    let loaded = loaded(path, text);
     let scenario = loaded.scenario.expect("it has a scenario");
     let table = ActionTable::new(loaded.space.expect("its space is sound"));
     let ads = recorded(&scenario).expect("its driving system exists");
-    page_of(record(&table, &scenario, &ads, TOLD).expect("it plays"))
+    page_of(record(&table, &scenario, &ads, text).expect("it plays"))
+}
+
+/// The page of a scenario in which two others crash into each other.
+fn wrecked_page() -> String {
+    let path = "tests/cases/written/twreck.ava";
+    page_told(path, &std::fs::read_to_string(root().join(path)).expect("it is a case"))
+}
+
+#[test]
+fn a_page_tells_of_crashes_among_others() {
+    let (header, _) = unpacked(&wrecked_page(), "s0");
+    let crash = &header["summary"]["crashes"][0];
+    assert_eq!((&crash["obstacle"], &crash["other"]), (&2.into(), &1.into()), "{crash}");
+    assert!(header["collisions"].as_array().is_some_and(Vec::is_empty), "the ego vehicle touches nobody");
 }
 
 #[test]
@@ -312,7 +331,7 @@ fn the_data_of_a_page_has_the_shapes_that_its_modules_read() {
     let each = |value: &Value| value.as_array().expect("a list").clone();
     let (table, scenario, ads) = walk();
     let walked = page_of(record(&table, &scenario, &ads, SOURCE).expect("it plays"));
-    for html in &[walked, breached_page()] {
+    for html in &[walked, breached_page(), wrecked_page()] {
         let index = index_of(html);
         holds("Index", &index);
         holds("Quantisation", &index["quantisation"]);
@@ -322,6 +341,7 @@ fn the_data_of_a_page_has_the_shapes_that_its_modules_read() {
         holds("Summary", &header["summary"]);
         each(&header["summary"]["collisions"]).iter().for_each(|one| holds("Finding", one));
         each(&header["summary"]["breaches"]).iter().for_each(|one| holds("Breach", one));
+        each(&header["summary"]["crashes"]).iter().for_each(|one| holds("Crash", one));
         for collision in each(&header["collisions"]) {
             holds("Collision", &collision);
             each(&collision["ways"]).iter().for_each(|way| holds("Way", way));

@@ -191,6 +191,32 @@ impl EpisodeLog {
         self.held[..self.held.partition_point(|held| held.from_s <= time_s)].last()
     }
 
+    /// Whether road users crashed into each other, not into the ego vehicle, in a step.
+    pub fn others_crashed_in(&self, step: usize) -> bool {
+        let begins_s = |step: usize| self.steps.get(step).map_or(f64::INFINITY, |step| step.time_s);
+        let of_step = begins_s(step)..begins_s(step + 1);
+        self.incidents.iter().any(|incident| of_step.contains(&incident.time_s))
+    }
+
+    /// When road users first crash into each other, not into the ego vehicle, s.
+    pub fn others_crash_s(&self) -> Option<f64> {
+        self.incidents.first().map(|incident| incident.time_s)
+    }
+
+    /// Each crash of road users into each other, in words. `space` is the one that was played.
+    pub fn incidents_in_words(&self, space: &Space) -> Vec<String> {
+        let bearers = self.bearers();
+        let name = |id: u32| match bearers.get(&id) {
+            Some(bearer) => format!("npc#{id} (`{}`)", space.bearers[*bearer]),
+            None => format!("npc#{id}"),
+        };
+        let told = |incident: &Incident| {
+            let (one, other) = (name(incident.obstacle), name(incident.other));
+            format!("{one} and {other} crash into each other at {:.2} s", incident.time_s)
+        };
+        self.incidents.iter().map(told).collect()
+    }
+
     /// The author's own bodies among the road users: number of the road user, index in the space.
     pub fn own_bodies(&self) -> BTreeMap<u32, usize> {
         self.newcomers().into_iter().flat_map(|(first, effect)| effect.own_bodies(first)).collect()

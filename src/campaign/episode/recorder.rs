@@ -9,7 +9,9 @@ use avastra_base::geometry::{Pose, Vec2};
 use avastra_drivers::Ads;
 use avastra_lang::model::body::BodyParameters;
 use avastra_lang::model::vocabulary::{Body, BodyClass, Level, ShownLights, TimeOfDay};
-use avastra_world::sim::{Contact, DT_S, Obstacle, SignalColour, VehicleParameters, World, friction_scale};
+use avastra_world::sim::{
+    Contact, DT_S, Incident, Obstacle, SignalColour, VehicleParameters, World, friction_scale,
+};
 
 /// The ego vehicle's brake lights are on above this much brake, %. Ours: a brake that only rubs lights nothing.
 const BRAKE_PCT_MIN: f64 = 1.0;
@@ -31,6 +33,8 @@ pub struct Recorder {
     pub lights: Vec<Lights>,
     /// Contacts of the ego vehicle with others.
     pub touches: Vec<Touch>,
+    /// Crashes of others into each other.
+    pub crashes: Vec<Crash>,
     /// Where in `others` a road user is.
     places: BTreeMap<u32, usize>,
 }
@@ -83,6 +87,14 @@ pub struct Touch {
     pub id: u32,
 }
 
+/// Two others crash into each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Crash {
+    /// At the end of the tick in which they do.
+    pub tick: u64,
+    pub ids: [u32; 2],
+}
+
 /// Time of day and weather, from a time on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sky {
@@ -116,6 +128,7 @@ impl Default for Recorder {
             skies: Vec::new(),
             lights: Vec::new(),
             touches: Vec::new(),
+            crashes: Vec::new(),
             places: BTreeMap::new(),
         }
     }
@@ -151,6 +164,21 @@ impl Recorder {
         self.note_sky(world);
         self.note_lights(world);
         self.touches.extend(contacts.iter().map(|contact| Touch { tick, id: contact.obstacle }));
+        let ids = |incident: &Incident| [incident.obstacle, incident.other];
+        self.crashes.extend(world.incidents().iter().map(|incident| Crash { tick, ids: ids(incident) }));
+    }
+
+    /// The numbers of those that a road user begins to touch in a tick; 0 is the ego vehicle.
+    pub fn met_by(&self, id: u32, tick: u64) -> Vec<u32> {
+        let touches = self.touches.iter().map(|touch| (touch.tick, [0, touch.id]));
+        let crashes = self.crashes.iter().map(|crash| (crash.tick, crash.ids));
+        let now = touches.chain(crashes).filter(|(at, _)| *at == tick).map(|(_, ids)| ids);
+        now.filter_map(|[one, other]| match id {
+            _ if id == one => Some(other),
+            _ if id == other => Some(one),
+            _ => None,
+        })
+        .collect()
     }
 
     /// Numbers of the road users whose brake lights are on at a tick; 0 is the ego vehicle.

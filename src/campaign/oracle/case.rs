@@ -74,8 +74,8 @@ impl Fate {
 pub enum Regression {
     /// A collision with the same obstacle counts.
     StillFails { time_s: f64 },
-    /// It does not touch the obstacle, and no other collision counts.
-    Fixed,
+    /// It does not touch the obstacle, and no other collision counts; when other road users crash into each other, if they do.
+    Fixed { others_crash_s: Option<f64> },
     /// A collision with another road user counts.
     OtherCrash,
     /// It touches the same obstacle, but no collision counts.
@@ -112,7 +112,7 @@ pub fn regression(setup: &Setup, log: &EpisodeLog, index: usize, ads: &Selected)
         (None, Some(own), _) => Regression::NotCounted { time_s: own.contact.time_s },
         (None, None, End::Failed(kind)) => Regression::AdsFailed(kind),
         (None, None, _) if obstacle.is_none() => Regression::NeverMet,
-        (None, None, _) => Regression::Fixed,
+        (None, None, _) => Regression::Fixed { others_crash_s: again.others_crash_s() },
     }
 }
 

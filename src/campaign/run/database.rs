@@ -65,7 +65,8 @@ pub(crate) const LAYOUT: Layout = Layout {
     ],
 };
 
-/// `step.top_speed_mps` is the ego vehicle's greatest speed in the step before the first contact, NULL after it.
+/// `step.top_speed_mps` is the ego vehicle's greatest speed in the step before the first contact, NULL after it;
+/// `step.others_crashed` whether other road users crashed into each other in it.
 /// `held` says what held the speed of the ego vehicle back, from the row's time to that of the next row. `offer`
 /// counts, per episode and row, the steps in which the row was legal (`reason` 0) or refused (other reasons); training
 /// writes nothing there. `breach.kept_by` has the careful drivers that keep the
@@ -383,7 +384,8 @@ impl Database {
                         coalesce(sum(ended = 'astray'), 0), coalesce(sum(ended = 'left_the_map'), 0),
                         (SELECT count(DISTINCT episode) FROM breach), ?1, ?2, ?3,
                         coalesce(sum(red_runs > 0 AND counted = 0
-                          AND episode NOT IN (SELECT episode FROM breach)), 0)
+                          AND episode NOT IN (SELECT episode FROM breach)), 0),
+                        (SELECT count(DISTINCT episode) FROM step WHERE others_crashed)
                  FROM episode",
             [replayed, recurring, counted_recurring],
             |row| {
@@ -421,6 +423,7 @@ impl Database {
                         recurring,
                         counted_recurring,
                         red_unkept,
+                        others_crashed,
                     }
                 );
                 Ok(totals)
@@ -521,6 +524,8 @@ pub struct Totals {
     /// Collisions in which the ego vehicle had priority, and in which the other had; the rest is neither.
     pub wronged: i64,
     pub wrong: i64,
+    /// Episodes in which other road users crashed into each other.
+    pub others_crashed: i64,
 }
 
 fn step_table() -> String {
@@ -533,7 +538,7 @@ fn step_table() -> String {
            action_row INTEGER, action TEXT, refused TEXT, states TEXT, proc REAL NOT NULL, reward REAL NOT NULL,
            ttc_s REAL, thw_s REAL, drac_mps2 REAL, required_mps2 REAL, rss_unsafe_s REAL,
            top_speed_mps REAL,
-           {}, PRIMARY KEY (episode, step)) STRICT;",
+           {}, others_crashed INTEGER NOT NULL, PRIMARY KEY (episode, step)) STRICT;",
         states.join(", ")
     )
 }
@@ -580,6 +585,7 @@ pub(crate) fn add_all(
             summary.top_speeds_mps.get(index).copied().flatten().into(),
         ]);
         values.extend(step.state.iter().map(|&value| f64::from(value).into()));
+        values.push(log.others_crashed_in(index).into());
         let places = vec!["?"; values.len()].join(", ");
         transaction
             .prepare_cached(&format!("INSERT INTO step VALUES ({places})"))?

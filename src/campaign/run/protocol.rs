@@ -33,10 +33,13 @@ pub enum Ending {
     Mitigated,
     /// With a contact at nearly the speed before.
     Hit,
+    /// Without a contact, but other road users crashed into each other: it was not the test that was meant.
+    OthersCrashed,
 }
 
 impl Ending {
-    pub const ALL: [Ending; 4] = [Ending::Avoided, Ending::Near, Ending::Mitigated, Ending::Hit];
+    pub const ALL: [Ending; 5] =
+        [Ending::Avoided, Ending::Near, Ending::Mitigated, Ending::Hit, Ending::OthersCrashed];
 
     pub fn in_words(self) -> &'static str {
         match self {
@@ -44,6 +47,7 @@ impl Ending {
             Ending::Near => "near miss",
             Ending::Mitigated => "mitigated",
             Ending::Hit => "hit",
+            Ending::OthersCrashed => "others crashed",
         }
     }
 }
@@ -73,6 +77,8 @@ pub struct ProtocolTest {
     pub breached: Vec<String>,
     /// Why nothing was carried out.
     pub refused: Option<String>,
+    /// Whether other road users crashed into each other.
+    pub others_crashed: bool,
 }
 
 impl ProtocolTest {
@@ -109,11 +115,12 @@ impl Database {
     /// If the file cannot be read.
     pub fn tests(&self, protocol: Option<&Space>) -> Result<Vec<ProtocolTest>, DatabaseError> {
         let read = &self.connection;
-        let steps =
-            "SELECT episode, step, action, ttc_s, top_speed_mps, action_row FROM step ORDER BY episode, step";
+        let steps = "SELECT episode, step, action, ttc_s, top_speed_mps, action_row, others_crashed FROM step ORDER BY episode, step";
         let steps = query_all(read, steps, |row| {
             let (episode, step, action) = (row.get(0)?, row.get(1)?, row.get(2)?);
-            Ok(Step { episode, step, action, ttc_s: row.get(3)?, top_mps: row.get(4)?, row: row.get(5)? })
+            let (ttc_s, top_mps, row_number, others_crashed) =
+                (row.get(3)?, row.get(4)?, row.get(5)?, row.get(6)?);
+            Ok(Step { episode, step, action, ttc_s, top_mps, row: row_number, others_crashed })
         })?;
         let contacts =
             "SELECT episode, step, ego_speed_mps, relative_speed_mps, counted, precrash, precrash_number
@@ -202,6 +209,7 @@ impl ProtocolTest {
             counted: false,
             breached: Vec::new(),
             refused: None,
+            others_crashed: false,
         }
     }
 
@@ -219,7 +227,9 @@ impl ProtocolTest {
         let before_mps = steps.iter().filter_map(|step| step.top_mps).reduce(f64::max);
         let is_near = ttc_s.into_iter().chain(pet_s).any(|time_s| time_s < NEAR_S);
         let impact = contacts.first();
+        let others_crashed = steps.iter().any(|step| step.others_crashed);
         let ending = match (impact, before_mps) {
+            (None, _) if others_crashed => Ending::OthersCrashed,
             (None, _) if is_near => Ending::Near,
             (None, _) => Ending::Avoided,
             (Some(impact), Some(before_mps)) if before_mps - impact.ego_mps >= MITIGATED_MPS => {
@@ -245,6 +255,7 @@ impl ProtocolTest {
             ttc_s,
             counted: contacts.iter().any(|contact| contact.counted),
             breached,
+            others_crashed,
             ..ProtocolTest::without_action(steps[0].episode, road)
         }
     }
@@ -266,6 +277,7 @@ struct Step {
     ttc_s: Option<f64>,
     top_mps: Option<f64>,
     row: Option<i64>,
+    others_crashed: bool,
 }
 
 /// The name and the values of an action as a run writes it: `name(a: 1, b: Left) with { c: 2 m }`.
@@ -292,7 +304,7 @@ fn said(text: &str) -> (String, Vec<(String, String)>) {
 /// How often each ending came, in the order of [`Ending::ALL`], and the speeds of contacts.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Tally {
-    pub endings: [u32; 4],
+    pub endings: [u32; 5],
     /// Tests with a breach.
     pub breached: u32,
     /// Means over contacts, m/s: the speed of the two against each other, that of the ego vehicle, and what this lost of its
@@ -502,6 +514,7 @@ mod tests {
             counted: false,
             breached: Vec::new(),
             refused: None,
+            others_crashed: false,
         }
     }
 
@@ -535,7 +548,7 @@ mod tests {
         let tally = map.cells[0][1].clone().expect("two were tried");
         assert_eq!(
             (tally.endings, tally.impact_mps, tally.reduction_mps),
-            ([0, 0, 0, 2], Some(5.0), Some(5.0))
+            ([0, 0, 0, 2, 0], Some(5.0), Some(5.0))
         );
         assert!(heat_maps(&tests, "speed", "colour").is_empty());
         assert_eq!(heat_maps(&tests, "speed", "")[0].columns, [""]);

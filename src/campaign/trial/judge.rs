@@ -14,7 +14,10 @@
 //! | cross road | it appears on a lane that is not of the route and comes onto the route's path before the ego vehicle has passed there; if it is asked to stand, it does not move at all |
 //! | walk | it appears beside the route on the asked side and walks over the route's path |
 //! | walk ahead, walk opposite | it appears beside the route where it was asked to, and walks along it that way |
-//! | stand | it stands on the route's path |
+//! | stand | it stands on the route's path, or beside it where it was asked to |
+//!
+//! Nobody crashes into another one than the ego vehicle. Who is to be somewhere `early` is there within 0.5 s, if the ego vehicle keeps
+//! its speed until then.
 //!
 //! Somebody who is ordered gets to the speed, the lane and the place that it was told, or does all phases of its manoeuvre.
 //!
@@ -52,6 +55,9 @@ const OPPOSES_RAD: f64 = 3.0 * core::f64::consts::FRAC_PI_4;
 /// An oncoming vehicle that passes farther aside than this does not meet the ego vehicle, m.
 const MEETS_M: f64 = 12.0;
 
+/// Who misses the moment of an `early` by more than this is not where it was told to be then, s. Ours.
+const LATE_S: f64 = 0.5;
+
 /// How long a vehicle is watched, s.
 pub(super) fn horizon_s(has_manoeuvre: bool) -> f64 {
     if has_manoeuvre { MANOEUVRE_S } else { HORIZON_S }
@@ -72,6 +78,21 @@ fn does_phases(seen: &Sighting) -> Result<(), String> {
         () if over == phases || begun == phases && seen.ending == Ending::TouchedEgo => Ok(()),
         () if begun > over => Err(ended(seen, &format!("phase {begun} of {phases} had ended"))),
         () => Err(ended(seen, &format!("phase {} of {phases} had begun", begun + 1))),
+    }
+}
+
+/// Whether it kept clear of all but the ego vehicle, and was in time where it was to be `early`.
+pub(super) fn keeps_clear_and_time(seen: &Sighting) -> Result<(), String> {
+    if seen.ending == Ending::TouchedOther {
+        let after_s = seen.frames[seen.frames.len() - 1].after_s;
+        return Err(format!("it and another road user crash into each other after {after_s:.1} s"));
+    }
+    match seen.late_s {
+        Some(late_s) if late_s.abs() > LATE_S => {
+            let how = if late_s > 0.0 { "late" } else { "soon" };
+            Err(format!("it is {:.1} s too {how} where it is to be `early`", late_s.abs()))
+        }
+        Some(_) | None => Ok(()),
     }
 }
 
@@ -113,7 +134,7 @@ pub(super) fn verdict(
     let asked = usize::from(request.then == Then::Change);
     match request.verb {
         Verb::Walk => walks(request, seen),
-        Verb::Stand => stands(seen),
+        Verb::Stand => stands(request, seen),
         Verb::WalkAhead | Verb::WalkOpposite => walks_along(request, seen),
         Verb::Follow => follows(request, seen),
         Verb::DriveAhead => {
@@ -209,6 +230,10 @@ fn appears_ahead(scene: &Scene, request: &SpawnRequest, first: &Frame) -> Result
     }
     if turned_rad(first) > core::f64::consts::FRAC_PI_2 {
         return Err("it appears against the direction of the route".to_owned());
+    }
+    // Where the route changes its lane, others of a row stay in the lane of the first one.
+    if request.first_m.is_some() {
+        return Ok(());
     }
     let own = scene.map.lane(scene.route.lane_at(first.route_station_m).lane);
     let aside_m = own.centre.project(first.outline.pose.position).offset_m;
@@ -327,11 +352,11 @@ fn walks_along(request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
     if is_done { Ok(()) } else { Err(ended(seen, "it had walked on")) }
 }
 
-fn stands(seen: &Sighting) -> Result<(), String> {
+fn stands(request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
     let first = &seen.frames[0];
     let stands = seen.frames.iter().all(|frame| frame.velocity_mps.norm() == 0.0);
-    let on_route = first.route_offset_m.abs() < first.ego.half_width_m;
-    if stands && on_route { Ok(()) } else { Err("it does not stand on the route".to_owned()) }
+    let is_there = (first.route_offset_m - request.offset_m).abs() < first.ego.half_width_m;
+    if stands && is_there { Ok(()) } else { Err("it does not stand where it was asked to".to_owned()) }
 }
 
 /// Checks that it changed its lane at least as often as asked, the last time after frame `after`, and at most `at_most` times

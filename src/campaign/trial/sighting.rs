@@ -54,6 +54,8 @@ pub(super) struct Sighting {
     pub phases: PhaseCount,
     /// Whether it has done what it was told.
     pub has_done: bool,
+    /// By how much it missed the moment of its last `early`, s; below 0 if it was too soon.
+    pub late_s: Option<f64>,
 }
 
 /// Lets time pass for up to `horizon_s` and watches the road user of an id; `None` if there is none.
@@ -103,7 +105,7 @@ pub(super) fn watch(
         }
     };
     let phases = world.phases(id).max(phases);
-    Some(Sighting { frames, ending, phases, has_done })
+    Some(Sighting { frames, ending, phases, has_done, late_s: world.late_s(id) })
 }
 
 /// Whether a vehicle drove over the edge of the map between two frames. It goes on there while it is in sight, and

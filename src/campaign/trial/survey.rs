@@ -317,7 +317,7 @@ fn attempt(moment: &Moment, draw: &Draw, bearers: &[String]) -> Try {
             Some(request) => judge::verdict(&scene, request, has_phases, &seen),
             None => judge::obeys(has_phases, &seen),
         };
-        if let Err(why) = verdict {
+        if let Err(why) = verdict.and_then(|()| judge::keeps_clear_and_time(&seen)) {
             let name = named(&draw.effects[nth]).map_or_else(String::new, |name| format!("`{name}`: "));
             found.failure.get_or_insert(format!("{name}{why}"));
         }

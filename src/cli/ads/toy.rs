@@ -157,7 +157,12 @@ impl Toy<'_> {
             // What it answers depends on its whole life, and not on the episode alone.
             Misbehaviour::Forgetful => {
                 let accel = -0.01 * (self.steps % 97) as f64;
-                line(&Answer::Acceleration(AccelerationMessage { seq, accel, internal: None }))
+                line(&Answer::Acceleration(AccelerationMessage {
+                    seq,
+                    accel,
+                    lane_change: None,
+                    internal: None,
+                }))
             }
         }))
     }
@@ -178,9 +183,12 @@ impl Toy<'_> {
             internal: None,
         };
         match self.arguments.answer {
-            ToyAnswer::Acceleration => {
-                Answer::Acceleration(AccelerationMessage { seq, accel: accel_mps2, internal })
-            }
+            ToyAnswer::Acceleration => Answer::Acceleration(AccelerationMessage {
+                seq,
+                accel: accel_mps2,
+                lane_change: None,
+                internal,
+            }),
             ToyAnswer::Control => {
                 Answer::Control(ControlMessage { accel: Some(accel_mps2), internal, ..control })
             }

@@ -227,8 +227,8 @@ impl External {
         let is_lost = tick - self.answered_tick.min(tick) >= lost_ticks;
         let time_s = tick as f64 * DT_S;
         match self.obeyed.clone() {
-            _ if is_lost => self.follower.lost(pose, &sensed.ego),
-            Some(answer) => self.follower.obey(&answer, time_s, pose, &sensed.ego),
+            last if is_lost => self.follower.lost(last.as_deref(), pose, &sensed.ego),
+            Some(answer) => self.follower.obey(&answer, time_s, pose, sensed),
             // Nothing was answered yet: it rolls.
             None => Control { steer_rad: sensed.ego.steer_rad, ..Control::default() },
         }

@@ -1,18 +1,30 @@
 //! From an answer to pedals and wheel: controls as they are, a trajectory by `modular`'s controllers, an acceleration
 //! with steering along the route.
+//!
+//! Who answers accelerations does not steer, so the lane changes of the route are made here: once there is room, by the rule of
+//! `idm`, and for as long as an indicator is on before. Other road users do not see that indicator: nothing in the world shows
+//! what the ego vehicle is about to do.
 
 use std::sync::Arc;
 
-use crate::kit::{Guide, Helm, Pedals, PedalsConfig, Point, SpeedRules, Steering};
+use crate::kit::{Guide, Helm, Pedals, PedalsConfig, Point, RouteChanges, SpeedRules, Steering};
+use crate::reference::has_gap;
 use avastra_base::geometry::{Pose, Vec2, wrap_angle};
-use avastra_world::sim::{Control, EgoMotion, Scene};
+use avastra_base::kinematics::needed_mps2;
+use avastra_world::sim::{Control, EgoMotion, FRAME_S, Scene, Sensed, VehicleParameters};
 
-use super::message::{Answer, ControlMessage, EXTREME_MPS2, TrajectoryMessage};
+use super::message::{
+    AccelerationMessage, Answer, ControlMessage, EXTREME_MPS2, LaneChangeWord, TrajectoryMessage,
+};
 
 /// Braking after the last point of a trajectory, magnitude, m/s².
 const AFTER_MPS2: f64 = 3.0;
 /// The brake while no answer comes, %: Apollo's, where the planner is late.
 const LOST_BRAKE_PCT: f64 = 50.0;
+/// For how long there has been room, and the indicator is on, before a lane change begins, s. Ours: as `modular` does.
+const INDICATES_S: f64 = 1.0;
+/// Where it must wait for room, it begins to brake when this much is needed, m/s². Ours: comfortable.
+const WAITS_MPS2: f64 = 2.0;
 
 /// Obeys answers.
 #[derive(Debug, Clone)]
@@ -23,6 +35,9 @@ pub struct Follower {
     /// Its station is on the route.
     pub helm: Helm,
     course: Option<Course>,
+    changes: RouteChanges,
+    /// For how long there has been room for the next lane change, s.
+    room_s: f64,
 }
 
 /// A trajectory, ready to be followed.
@@ -35,13 +50,15 @@ struct Course {
 }
 
 impl Follower {
-    pub fn new(scene: &Scene) -> Follower {
+    pub fn new(scene: &Arc<Scene>) -> Follower {
         Follower {
             route: Arc::new(Guide::new(scene, &SpeedRules::NONE)),
             steering: Steering::usual(),
             pedals: Pedals::new(&PedalsConfig::default()),
             helm: Helm::default(),
             course: None,
+            changes: RouteChanges::new(scene, SpeedRules::NONE),
+            room_s: 0.0,
         }
     }
 
@@ -60,11 +77,17 @@ impl Follower {
     }
 
     /// Pedals and wheel for this tick; `pose` is where the driving system was told to be.
-    pub fn obey(&mut self, answer: &Answer, time_s: f64, pose: &Pose, motion: &EgoMotion) -> Control {
+    pub fn obey(&mut self, answer: &Answer, time_s: f64, pose: &Pose, sensed: &Sensed) -> Control {
+        let motion = &sensed.ego;
         match answer {
             Answer::Control(control) => controls(control),
             Answer::Acceleration(wanted) => {
-                Control::towards(wanted.accel, self.along_route_rad(pose, motion))
+                if self.helm.looks() {
+                    self.seek_room(wanted, sensed);
+                }
+                let station_m = self.helm.station_m();
+                let steer_rad = self.steering.steer_rad(self.changes.guide(), pose, station_m, motion);
+                Control::towards(self.before_change_mps2(wanted, motion), steer_rad)
             }
             Answer::Trajectory(_) => {
                 let course = self.course.as_mut().expect("a trajectory was begun");
@@ -78,14 +101,49 @@ impl Follower {
         }
     }
 
-    /// Pedals and wheel while no answer comes: it brakes along the route.
-    pub fn lost(&self, pose: &Pose, motion: &EgoMotion) -> Control {
-        let steer_rad = self.along_route_rad(pose, motion);
+    /// Pedals and wheel while no answer comes after this one: it brakes along the route, or, where the lane changes are made here, in
+    /// its lane.
+    pub fn lost(&self, last: Option<&Answer>, pose: &Pose, motion: &EgoMotion) -> Control {
+        let guide = match last {
+            Some(Answer::Acceleration(_)) => self.changes.guide(),
+            _ => &self.route,
+        };
+        let steer_rad = self.steering.steer_rad(guide, pose, self.helm.station_m(), motion);
         Control { throttle_pct: 0.0, brake_pct: LOST_BRAKE_PCT, steer_rad }
     }
 
-    fn along_route_rad(&self, pose: &Pose, motion: &EgoMotion) -> f64 {
-        self.steering.steer_rad(&self.route, pose, self.helm.station_m(), motion)
+    /// Begins the next lane change of the route if it is time, there is room, and the driving system does not say otherwise.
+    fn seek_room(&mut self, wanted: &AccelerationMessage, sensed: &Sensed) {
+        let (station_m, speed_mps) = (self.helm.station_m(), sensed.ego.speed_mps);
+        let Some(change) = self.changes.next() else { return };
+        let is_soon = station_m >= change.begin_m - speed_mps * INDICATES_S;
+        let has_room = match wanted.lane_change {
+            Some(LaneChangeWord::Wait) => false,
+            Some(LaneChangeWord::Go) => true,
+            None => {
+                is_soon
+                    && has_gap(self.changes.guide(), &sensed.objects, speed_mps, station_m, change.lateral_m)
+            }
+        };
+        if !has_room {
+            self.room_s = 0.0;
+            return;
+        }
+        let has_indicated = self.room_s >= INDICATES_S || wanted.lane_change == Some(LaneChangeWord::Go);
+        self.room_s += FRAME_S;
+        if has_indicated && self.changes.due(station_m).is_some() {
+            self.changes.begin(station_m);
+            self.room_s = 0.0;
+        }
+    }
+
+    /// The wanted acceleration, m/s², or the braking after which it stands where the next lane change is just possible.
+    fn before_change_mps2(&self, wanted: &AccelerationMessage, motion: &EgoMotion) -> f64 {
+        let Some(wait_m) = self.changes.wait_m() else { return wanted.accel };
+        let ahead_m = wait_m - VehicleParameters::MKZ.front_m(self.helm.station_m());
+        let needed_mps2 = needed_mps2(motion.speed_mps, ahead_m.max(0.1));
+        let waits = needed_mps2 > WAITS_MPS2 || ahead_m <= 0.1;
+        if waits { wanted.accel.min(-needed_mps2.max(WAITS_MPS2)) } else { wanted.accel }
     }
 }
 
@@ -148,7 +206,101 @@ impl Course {
 mod tests {
     use super::*;
     use crate::external::message::TrajectoryPoint;
+    use avastra_lang::model::vocabulary::Body;
+    use avastra_road::RouteLaneChange;
     use avastra_world::sim::pedals_for;
+
+    use crate::driver::Ads;
+    use crate::status::Status;
+    use crate::testing::{Rig, SOURCE_Y_M, TARGET_Y_M, object, two_lanes};
+
+    /// A driving system that keeps its speed by accelerations, and says this of lane changes.
+    #[derive(Clone)]
+    struct Keeps {
+        follower: Follower,
+        says: Option<LaneChangeWord>,
+        status: Status,
+    }
+
+    impl Keeps {
+        /// At 8 m/s on a road of two lanes whose route goes over to the left one at once.
+        fn rig(open_m: f64, says: Option<LaneChangeWord>) -> Rig {
+            let scene = two_lanes(open_m);
+            let keeps = Keeps { follower: Follower::new(&scene), says, status: Status::default() };
+            Rig::new(&scene, Box::new(keeps), 8.0)
+        }
+    }
+
+    impl Ads for Keeps {
+        fn drive(&mut self, sensed: &Sensed) -> Control {
+            let pose = sensed.ego.rear_axle;
+            self.follower.locate(&pose);
+            let accel = 8.0 - sensed.ego.speed_mps;
+            let answer = AccelerationMessage { seq: 0, accel, lane_change: self.says, internal: None };
+            let control = self.follower.obey(&Answer::Acceleration(answer), sensed.time_s, &pose, sensed);
+            self.follower.helm.command(control, &sensed.ego, &mut self.status)
+        }
+
+        fn status(&self) -> &Status {
+            &self.status
+        }
+    }
+
+    fn is_at(rig: &Rig, y_m: f64) -> bool {
+        (rig.place().y - y_m).abs() < 0.3
+    }
+
+    #[test]
+    fn one_that_overtakes_passes_before_the_lane_is_changed() {
+        let mut rig = Keeps::rig(300.0, None);
+        rig.sensed.objects = vec![object(1, Body::Sedan, Pose::new(-15.0, TARGET_Y_M, 0.0), 13.0)];
+        rig.run(1.0);
+        assert!(is_at(&rig, SOURCE_Y_M), "{:?}", rig.place());
+        rig.run(20.0);
+        assert!(is_at(&rig, TARGET_Y_M) && rig.gap_m_min > 1.0, "{:?}, {} m", rig.place(), rig.gap_m_min);
+    }
+
+    #[test]
+    fn a_lane_change_waits_for_room_where_it_is_just_possible() {
+        let mut rig = Keeps::rig(100.0, None);
+        let stands =
+            |nth: u32| object(nth + 1, Body::Sedan, Pose::new(f64::from(nth) * 8.0, TARGET_Y_M, 0.0), 0.0);
+        rig.sensed.objects = (0..14).map(stands).collect();
+        rig.run(30.0);
+        let wait_m = rig.scene.route.changes[0].latest_m - RouteLaneChange::LENGTH_M_MIN;
+        let place = rig.place();
+        assert!(
+            is_at(&rig, SOURCE_Y_M) && (wait_m - 6.0..wait_m + 1.0).contains(&place.x),
+            "{place:?}, {wait_m}"
+        );
+        for object in &mut rig.sensed.objects {
+            object.velocity_mps = Vec2::new(9.0, 0.0);
+        }
+        rig.run(40.0);
+        assert!(is_at(&rig, TARGET_Y_M) && rig.gap_m_min > 1.0, "{:?}, {} m", rig.place(), rig.gap_m_min);
+    }
+
+    #[test]
+    fn a_driving_system_may_hold_a_lane_change_and_may_make_it_itself() {
+        let mut waits = Keeps::rig(100.0, Some(LaneChangeWord::Wait));
+        waits.run(30.0);
+        assert!(is_at(&waits, SOURCE_Y_M) && waits.speed_mps() < 0.1, "{:?}", waits.place());
+        // Whoever is there: the other one is beside it all the time.
+        let mut goes = Keeps::rig(300.0, Some(LaneChangeWord::Go));
+        goes.sensed.objects = vec![object(1, Body::Sedan, Pose::new(0.0, TARGET_Y_M, 0.0), 8.0)];
+        goes.run(15.0);
+        assert!(is_at(&goes, TARGET_Y_M), "{:?}", goes.place());
+        // Without anybody it takes the time that it indicates.
+        let mut free = Keeps::rig(300.0, None);
+        free.run(0.9);
+        let begins_m = free.place().y;
+        free.run(15.0);
+        assert!(
+            (begins_m - SOURCE_Y_M).abs() < 0.05 && is_at(&free, TARGET_Y_M),
+            "{begins_m}, {:?}",
+            free.place()
+        );
+    }
 
     #[test]
     fn a_trajectory_that_ends_at_rest_is_held_there() {

@@ -98,7 +98,17 @@ macro_rules! schemas_of_words {
     };
 }
 
-schemas_of_words!(Observation, AnswerKind, Class, Light, TurnWord, SignWord, PrecedenceWord, VehicleLights);
+schemas_of_words!(
+    Observation,
+    AnswerKind,
+    Class,
+    Light,
+    TurnWord,
+    SignWord,
+    PrecedenceWord,
+    VehicleLights,
+    LaneChangeWord
+);
 
 words! {
     /// What a driving system is shown.
@@ -122,6 +132,11 @@ words! {
 words! {
     /// Lights that a vehicle shows beside its headlights: indicators on both sides or on one, or headlights that are flashed.
     pub enum VehicleLights { Hazard = "hazard", Left = "left", Right = "right", Flash = "flash" }
+}
+
+words! {
+    /// What a driving system that answers accelerations says of the route's next lane change: not now, or now, whoever is there.
+    pub enum LaneChangeWord { Wait = "wait", Go = "go" }
 }
 
 words! {
@@ -499,6 +514,8 @@ message! {
         seq: u64;
         /// m/s²; negative brakes. The vehicle does as much of it as it can.
         accel: f64;
+        ? /// What is to become of the route's next lane change; without it avastra looks whether there is room.
+        lane_change: LaneChangeWord;
         ? /// What it believes and wants.
         internal: Internal;
     }

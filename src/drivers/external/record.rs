@@ -288,7 +288,7 @@ mod tests {
     fn answers_go_through_their_file_and_changes_are_noticed() {
         let internal =
             Internal { reason: Some("follow 3".into()), planned: None, localized: None, plan_ms: Some(4.0) };
-        let answer = AccelerationMessage { seq: 0, accel: -0.1, internal: Some(internal) };
+        let answer = AccelerationMessage { seq: 0, accel: -0.1, lane_change: None, internal: Some(internal) };
         let key = Key::new(&[b"a", b"b"]);
         let failure = Failure::new(Problem::Exited, "step 2", "the process ended");
         let exchanges = vec![

@@ -19,6 +19,7 @@ use crate::kit::{
 use crate::status::{PerceivedObject, Reason, Status};
 use avastra_base::geometry::{Beside, Pose, Vec2, unit_vector};
 use avastra_base::kinematics::{Following, WANDER_M, needed_mps2};
+use avastra_road::RouteLaneChange;
 use avastra_world::sim::{Control, DT_S, Scene, Sensed, SensedObject, SignalColour, VehicleParameters};
 
 use super::giving_way::goes_before;
@@ -169,31 +170,11 @@ impl Idm {
     fn seek_gap(&mut self, sensed: &Sensed, station_m: f64) {
         let Some(change) = self.changes.next() else { return };
         let is_over = self.changes.last_end_m().is_none_or(|end_m| station_m >= end_m);
-        let has_gap = || self.has_gap(&sensed.objects, sensed.ego.speed_mps, station_m, change.lateral_m);
+        let has_gap =
+            || has_gap(self.guide(), &sensed.objects, sensed.ego.speed_mps, station_m, change.lateral_m);
         if is_over && station_m >= change.begin_m && !self.is_beset && has_gap() {
             self.changes.begin(station_m);
         }
-    }
-
-    /// Whether gentle braking would do for every vehicle in the lane `lateral_m` to the left, and for the
-    /// ego vehicle, if the ego vehicle were in that lane now.
-    fn has_gap(&self, objects: &[SensedObject], ego_mps: f64, station_m: f64, lateral_m: f64) -> bool {
-        let front_m = VehicleParameters::MKZ.front_m(station_m);
-        let rear_m = front_m - VehicleParameters::MKZ.length_m;
-        objects.iter().all(|object| {
-            let Some((span, along_mps)) = in_lane(self.guide(), object, lateral_m, front_m) else {
-                return true;
-            };
-            let along_mps = along_mps.max(0.0);
-            let needed_mps2 = if span.from_m > front_m {
-                model_mps2(ego_mps, ego_mps.max(1.0), Some((span.from_m - front_m, along_mps)))
-            } else if span.to_m < rear_m {
-                model_mps2(along_mps, along_mps.max(1.0), Some((rear_m - span.to_m, ego_mps)))
-            } else {
-                return false;
-            };
-            needed_mps2 > -SAFE_MPS2
-        })
     }
 
     /// Lights that it stops for.
@@ -290,7 +271,9 @@ impl Idm {
     /// Looks aside at what is seen at this moment: unless that leaves a gap, no lane change begins in the next look.
     pub(super) fn glance(&mut self, seen: &[SensedObject], ego_mps: f64, station_m: f64) {
         let next = self.changes.next();
-        self.is_beset = next.is_some_and(|change| !self.has_gap(seen, ego_mps, station_m, change.lateral_m));
+        let is_open =
+            |change: &RouteLaneChange| has_gap(self.guide(), seen, ego_mps, station_m, change.lateral_m);
+        self.is_beset = next.is_some_and(|change| !is_open(change));
     }
 
     /// Learns from the vehicle's place which lane changes of the route are begun or over, before its first look. A driver
@@ -336,6 +319,31 @@ impl Ads for Idm {
     fn take_over(&mut self, sensed: &Sensed) {
         self.stay(&sensed.ego.rear_axle);
     }
+}
+
+/// Whether gentle braking would do for every vehicle in the lane `lateral_m` to the left of a guide, and for the ego vehicle, if
+/// the ego vehicle were in that lane now.
+pub fn has_gap(
+    guide: &Guide,
+    objects: &[SensedObject],
+    ego_mps: f64,
+    station_m: f64,
+    lateral_m: f64,
+) -> bool {
+    let front_m = VehicleParameters::MKZ.front_m(station_m);
+    let rear_m = front_m - VehicleParameters::MKZ.length_m;
+    objects.iter().all(|object| {
+        let Some((span, along_mps)) = in_lane(guide, object, lateral_m, front_m) else { return true };
+        let along_mps = along_mps.max(0.0);
+        let needed_mps2 = if span.from_m > front_m {
+            model_mps2(ego_mps, ego_mps.max(1.0), Some((span.from_m - front_m, along_mps)))
+        } else if span.to_m < rear_m {
+            model_mps2(along_mps, along_mps.max(1.0), Some((rear_m - span.to_m, ego_mps)))
+        } else {
+            return false;
+        };
+        needed_mps2 > -SAFE_MPS2
+    })
 }
 
 /// The model's acceleration, m/s², with the gap (m) and speed (m/s) of what is ahead.

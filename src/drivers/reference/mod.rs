@@ -14,5 +14,6 @@ mod tests;
 pub use driver::{Reference, in_sight};
 pub use evasion::Evasion;
 pub use idm::Idm;
+pub(crate) use idm::has_gap;
 pub use r157::{CarefulHuman, FuzzySafety, MinimalPerformance};
 pub use rss::Rss;

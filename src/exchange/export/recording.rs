@@ -44,6 +44,8 @@ pub struct Recording {
     pub names: BTreeMap<u32, String>,
     /// Where the scenario comes from, what it claims, and the scenario as text of the language: name and value.
     pub facts: Vec<(String, String)>,
+    /// The steps whose action did not happen, each with the reason, in words.
+    pub refused: Vec<String>,
 }
 
 /// What a road user was told that appears at the start, and is told nothing later.
@@ -79,7 +81,8 @@ impl Recording {
 }
 
 /// Plays a scenario again and writes down what happens. What it claims about the drive itself (collisions, end, digest of
-/// all ticks) must hold; verdicts about collisions are handed on as they are written.
+/// all ticks) must hold; verdicts about collisions are handed on as they are written. What is not legal in it is said in
+/// [`Recording::refused`].
 ///
 /// # Errors
 /// If it cannot be played, or plays otherwise than it claims.
@@ -96,7 +99,11 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
     let driven = |claim: &Claim| {
         matches!(claim, Claim::Collision { .. } | Claim::Trace(_) | Claim::Proc(_) | Claim::End(_))
     };
-    let claims = stage.refuted(ads, &log, &[], driven);
+    let mut claims = stage.refuted(ads, &log, &[], driven);
+    let refused: Vec<String> =
+        log.refused().map(|(step, reason)| format!("step {step} does not happen: {reason}")).collect();
+    // Before those of the claims stand those of refused steps.
+    claims.drain(..refused.len());
     if !claims.is_empty() {
         return Err(ExportError::Refuted { claims });
     }
@@ -121,6 +128,7 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
         own_bodies: log.own_bodies().into_iter().map(named).collect(),
         names: log.bearers().into_iter().map(borne).collect(),
         facts,
+        refused,
     })
 }
 

@@ -116,7 +116,7 @@ pub fn record_another(
                         false => json!({ "kind": "other_time", "later_s": time_s - at_s }),
                     }
                 }
-                Regression::Fixed => json!({ "kind": "gone" }),
+                Regression::Fixed { .. } => json!({ "kind": "gone" }),
                 Regression::OtherCrash => json!({ "kind": "other_crash" }),
                 Regression::NeverMet => {
                     json!({ "kind": "never_met", "why": refused_there(&first.log, index, &recording.log) })
@@ -191,6 +191,7 @@ fn played(
         "steps": log.steps.len(), "actions": log.steps.iter().filter(|step| matches!(step.outcome, Outcome::Done { .. })).count(),
         "collisions": collisions.iter().map(without_ways).collect::<Vec<_>>(),
         "refuted": refuted, "same": is_same, "breaches": breaches(table, scenario, &log),
+        "crashes": crashes(table, &log),
     });
     let steps: Vec<Value> =
         log.steps.iter().enumerate().map(|(index, _)| step(table, &log, index, offers.get(index))).collect();
@@ -293,6 +294,18 @@ fn collision(
         "recurrence": recurrence, "sudden": facts.sudden, "struck": facts.struck, "cause": cause,
         "held": log.held_at(contact.time_s).map(Held::text), "ways": ways,
     })
+}
+
+/// Crashes of road users into each other.
+fn crashes(table: &ActionTable, log: &EpisodeLog) -> Vec<Value> {
+    let told = log.incidents.iter().zip(log.incidents_in_words(table.space()));
+    told.map(|(incident, text)| {
+        json!({
+            "at_s": incident.time_s, "x_m": incident.point.x, "y_m": incident.point.y,
+            "obstacle": incident.obstacle, "other": incident.other, "text": text,
+        })
+    })
+    .collect()
 }
 
 /// What the ego vehicle did not keep, and which careful drivers would have, as the file claims.

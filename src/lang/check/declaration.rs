@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::check::checker::{Checker, Signature, docs, each};
-use crate::check::expression::{NUMBER_MAX, Place, is_beyond_states};
+use crate::check::expression::{NUMBER_MAX, Place, article, is_beyond_states};
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of};
 use crate::check::rule::names_in;
@@ -557,7 +557,9 @@ impl Checker {
             let name = self.references.type_name(ty);
             let message = format!("type mismatch: wanted a {kind}, found `{name}`");
             let error = Diagnostic::error(code::TYPE_MISMATCH, message);
-            return self.reject(error.at(span, format!("this is a `{name}`")));
+            // What is said of a word that there is not, says which there are.
+            let help = known(self, "", span).err().and_then(|unknown| unknown.help);
+            return self.reject(error.at(span, format!("this is {}", article(&name))).help_if(help));
         };
         let declared = self.enums[of.0].clone();
         let label = format!("`{}` is used as a {kind} here", declared.name);

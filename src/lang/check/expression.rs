@@ -10,8 +10,8 @@ use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::vocabulary::{
-    BEGINS, Fact, Known, NearWord, PastWord, ROAD_LANES, SINCE, Site, THERE, Word, WordFact, parts_of,
-    parts_of_named, thing_of, things,
+    BEGINS, Fact, Known, NearWord, NumberWord, PastWord, ROAD_LANES, SINCE, Site, THERE, Word, WordFact,
+    parts_of, parts_of_named, thing_of, things,
 };
 use crate::model::{EnumIndex, STATE_MAX, StateDef, Type, code};
 use crate::syntax::ast::{Span, UnaryOp};
@@ -557,6 +557,11 @@ impl Checker {
         {
             return self.past(word, call, place);
         }
+        if let Some(word) = NumberWord::from_name(&call.name.text)
+            && self.function_names.get(&call.name.text).is_none()
+        {
+            return self.of_numbers(word, call, place);
+        }
         if call.name.text == BEGINS.0 && self.function_names.get(BEGINS.0).is_none() {
             return self.begins(call, place);
         }
@@ -589,6 +594,35 @@ impl Checker {
         };
         let arguments = self.arguments(call, &parameters, Some(header), place)?;
         Some(Expr { kind: ExprKind::Call(index, arguments), ty: result, span: call.span })
+    }
+
+    /// `min`, `max` and `abs`: of numbers of one kind, of which the result is one, too.
+    fn of_numbers(&mut self, word: NumberWord, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
+        self.references.note(call.name.span, Symbol::Engine(word.name(), word.meaning()), false);
+        let wanted = word.arity();
+        if call.args.len() != wanted || call.args.iter().any(|argument| argument.name.is_some()) {
+            self.look_at_arguments(&call.args, place);
+            let (name, numbers, given) = match wanted {
+                1 => (word.name(), "one number", "(npc.offset)"),
+                _ => (word.name(), "two numbers", "(npc.speed, 10 m/s)"),
+            };
+            let error = Diagnostic::error(code::ARGUMENTS, format!("`{name}` takes {numbers}"));
+            return self.reject(error.at(call.span, "").help(format!("write `{name}{given}`, for example")));
+        }
+        let numbers: Vec<Option<Expr>> =
+            call.args.iter().map(|argument| self.numeric(&argument.value, place)).collect();
+        let numbers: Vec<Expr> = numbers.into_iter().collect::<Option<_>>()?;
+        if let [left, right] = numbers.as_slice()
+            && dimension(left.ty) != dimension(right.ty)
+        {
+            let (left_of, right_of) = (&call.args[0].value, &call.args[1].value);
+            let sides = Sides { left: left_of, right: right_of, span: call.span };
+            self.mismatch("cannot be compared", call.name.span, sides, left, right);
+            return None;
+        }
+        let all_whole = numbers.iter().all(|number| number.ty == Type::Int);
+        let ty = if all_whole { Type::Int } else { Type::Quantity(dimension(numbers[0].ty)) };
+        Some(Expr { kind: ExprKind::OfNumbers(word, numbers), ty, span: call.span })
     }
 
     /// The arguments of a call, by parameter. `header` is where the parameters are declared.

@@ -92,7 +92,7 @@ impl Checker {
         })
     }
 
-    fn mismatch(&mut self, what: &str, at: Span, sides: Sides<'_>, left: &Expr, right: &Expr) {
+    pub(super) fn mismatch(&mut self, what: &str, at: Span, sides: Sides<'_>, left: &Expr, right: &Expr) {
         let (a, b) = (self.references.type_name(left.ty), self.references.type_name(right.ty));
         let code =
             if is_number(left.ty) && is_number(right.ty) { code::UNIT_MISMATCH } else { code::TYPE_MISMATCH };

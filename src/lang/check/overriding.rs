@@ -145,7 +145,16 @@ fn left_names(
             } else if next == name.text {
                 let candidates = members().filter_map(|standing| standing.item.kind.name());
                 let candidates: Vec<&str> = candidates.map(|name| name.text.as_str()).collect();
-                diagnostics.push(unknown("action, group or rule", &name.text, name.span, candidates));
+                let error = unknown("action, group or rule", &name.text, name.span, candidates);
+                let is_road = |standing: &Standing<'_>| {
+                    standing.item.kind.as_road().is_some_and(|road| road.name.text == name.text)
+                };
+                diagnostics.push(match standing.iter().any(is_road) {
+                    true => {
+                        error.help("it is a road: `episode { roads: [NAME] }` says on which ones to play")
+                    }
+                    false => error,
+                });
             }
         }
     }

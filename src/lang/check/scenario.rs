@@ -143,7 +143,7 @@ impl<'a> Reader<'a> {
         // Any seed will do: every state that it draws is replaced below or reported as missing.
         let mut start = ScenarioStart {
             memory: space.initial_memory(0),
-            signal_phase_s: 0.0,
+            signal_phase_s: road.and_then(|road| self.space.roads[road].signal_phase_s).unwrap_or(0.0),
             traffic_seed: None,
             ambient: 0,
             ego_mps: road.map_or(START_MPS, |road| self.space.roads[road].ego_mps),

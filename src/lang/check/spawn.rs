@@ -474,7 +474,8 @@ impl Checker {
                 let (is, should) = if behind { ("behind", "ahead") } else { ("ahead of", "behind") };
                 let message = format!("`{}` does not begin {is} the ego vehicle", verb.name());
                 let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
-                self.report(error.help(format!("write `{should}`")));
+                let other = if behind { "`DriveBehind`" } else { "`DriveAhead`" };
+                self.report(error.help(format!("write `{should}`, or {other} for one that begins {is} it")));
                 return;
             }
         }

@@ -8,7 +8,7 @@ use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Who};
 use crate::model::space::{BodyWord, COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::{
-    Crossing, LaneChoice, Light, NearWord, PastWord, Priority, RoadKind, Turn, Word, WordFact,
+    Crossing, LaneChoice, Light, NearWord, NumberWord, PastWord, Priority, RoadKind, Turn, Word, WordFact,
 };
 
 /// Numbers that differ by at most this part of the larger one are equal, and their difference is 0, unless both are whole.
@@ -203,6 +203,8 @@ pub struct NpcFacts {
     /// Where it is along the trajectory that it follows; 0 if it follows none.
     pub station_m: f64,
     pub has_siren: bool,
+    /// Whether it and another one than the ego vehicle have crashed into each other. Known only of who is there.
+    pub crashed: bool,
     /// Whether it is the one ahead of the ego vehicle, in which lane to the left of that one's it is, and how far off the road, m:
     /// known only to who watches.
     pub leads: bool,
@@ -319,6 +321,9 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
                 }
             }
         }
+        ExprKind::OfNumbers(word, numbers) => {
+            Value::Number(of_numbers(*word, numbers.iter().map(|expr| value(expr).number())))
+        }
         ExprKind::Not(inner) => Value::Bool(!value(inner).truth()),
         ExprKind::Negate(inner) => Value::Number(-value(inner).number()),
         ExprKind::Arithmetic(op, left, right) => {
@@ -387,6 +392,18 @@ pub(crate) fn word_of_bearer(who: Who, fact: WordFact, facts: &Facts<'_>) -> Opt
 
 fn has_lane(facts: &Facts<'_>, lane: LaneChoice) -> bool {
     facts.road.is_some_and(|road| road.has_lane(lane))
+}
+
+/// What a word makes of numbers; NaN if one of them has no value.
+pub(crate) fn of_numbers(word: NumberWord, numbers: impl Iterator<Item = f64>) -> f64 {
+    let chosen = |a: f64, b: f64| match word {
+        _ if a.is_nan() => a,
+        NumberWord::Min if a <= b => a,
+        NumberWord::Max if a >= b => a,
+        NumberWord::Min | NumberWord::Max | NumberWord::Abs => b,
+    };
+    let sized = numbers.map(|number| if word == NumberWord::Abs { number.abs() } else { number });
+    sized.reduce(chosen).unwrap_or(f64::NAN)
 }
 
 /// The result, or NaN if it has no value: an infinity would satisfy comparisons.

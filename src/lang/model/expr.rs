@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use crate::model::space::BodyWord;
 use crate::model::value::{EnumIndex, Type, Value};
-use crate::model::vocabulary::{Fact, Known, LaneChoice, NearWord, PastWord, WordFact};
+use crate::model::vocabulary::{Fact, Known, LaneChoice, NearWord, NumberWord, PastWord, WordFact};
 use crate::syntax::ast::Span;
 pub use crate::syntax::ast::{Arithmetic, Comparison};
 use avastra_base::units::Rational;
@@ -76,6 +76,8 @@ pub enum ExprKind {
     Margin(usize),
     /// A function by its index in `Space::functions`.
     Call(usize, Vec<Expr>),
+    /// `min(a, b)`, `max(a, b)`, `abs(a)`: of as many numbers as the word takes.
+    OfNumbers(NumberWord, Vec<Expr>),
     Not(Box<Expr>),
     Negate(Box<Expr>),
     Arithmetic(Arithmetic, Box<Expr>, Box<Expr>),
@@ -170,7 +172,9 @@ impl Expr {
             | ExprKind::Near(_, _, inner)
             | ExprKind::Negate(inner)
             | ExprKind::InLanes(inner, _) => visit(inner),
-            ExprKind::Call(_, arguments) => arguments.iter().for_each(visit),
+            ExprKind::Call(_, arguments) | ExprKind::OfNumbers(_, arguments) => {
+                arguments.iter().for_each(visit);
+            }
             ExprKind::Arithmetic(_, left, right)
             | ExprKind::Compare(_, left, right)
             | ExprKind::And(left, right)

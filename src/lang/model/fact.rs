@@ -264,6 +264,8 @@ facts! {
         "A `Length`: where its rear axle, or on foot its middle, is along the trajectory that it follows; 0 if it follows none.", FROM_0;
     NpcSiren "npc.siren" Type::Bool, Spawn, npc.has_siren =
         "A `Bool`: whether it is an emergency vehicle under way, for which all others wait.";
+    NpcCrashed "npc.crashed" Type::Bool, Spawn, npc.crashed =
+        "A `Bool`: whether it and another road user than the ego vehicle have crashed into each other.";
     SpawnGap "spawn_gap" LENGTH, Spawn, spawn.spawn_gap_m =
         "A `Length`: the gap from the ego vehicle to the road user that appears.", FROM_0;
     SafetyGap "safety_gap" LENGTH, Spawn, spawn.safety_gap_m =

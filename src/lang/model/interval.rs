@@ -100,6 +100,19 @@ impl Interval {
         Interval { low: sum(self.low, other.low), high: sum(self.high, other.high) }
     }
 
+    /// The lesser of a number of this and one of the other.
+    pub fn min(&self, other: &Interval) -> Interval {
+        let both = self.hull(other);
+        // At most what each can be.
+        let at_most = |end: End| Interval { low: End::Unbounded, high: end };
+        Interval { low: both.low, high: at_most(self.high).intersect(&at_most(other.high)).high }
+    }
+
+    /// The greater of a number of this and one of the other.
+    pub fn max(&self, other: &Interval) -> Interval {
+        self.neg().min(&other.neg()).neg()
+    }
+
     pub fn neg(&self) -> Interval {
         let [low, high] = [self.high, self.low].map(|end| end.map(Rational::checked_neg));
         Interval { low, high }

@@ -51,7 +51,7 @@ pub struct Origin {
 pub struct ScenarioStart {
     /// Every state variable: as the `start` block says, else as the space declares.
     pub memory: Memory,
-    /// `signal_phase`, s; 0 if not given.
+    /// `signal_phase`, s; if not given that of the road, or else 0.
     pub signal_phase_s: f64,
     /// `traffic_seed`: seed of the choices of other road users.
     pub traffic_seed: Option<u64>,

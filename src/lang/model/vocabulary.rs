@@ -275,6 +275,20 @@ pub const BEGINS: (&str, &str) = (
 );
 
 words! {
+    NumberWord "What is made of numbers of one kind: spelt like a function.":
+    Min "min" = "The lesser of two numbers: `min(npc.speed, 10 m/s)`.",
+    Max "max" = "The greater of two numbers: `max(gap - 1 s, 0 s)`.",
+    Abs "abs" = "A number without its sign: `abs(npc.offset) <= 0.5 m`.",
+}
+
+impl NumberWord {
+    /// How many numbers it takes.
+    pub fn arity(self) -> usize {
+        if self == NumberWord::Abs { 1 } else { 2 }
+    }
+}
+
+words! {
     NearWord "What a requirement may ask of the road users near: spelt like a function of bodies and a condition.":
     Some "some" = "Whether a condition holds of a road user near, with one of these bodies if they are named: `some(Pedestrian, npc.gap <= 5 m)`.",
     Count "count" = "Of how many road users near a condition holds: `count(Vehicle, npc.gap <= 20 m) <= 3`.",

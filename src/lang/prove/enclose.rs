@@ -5,7 +5,8 @@
 
 use crate::model::effort;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
-use crate::model::vocabulary::{Fact, NearWord, PastWord};
+use crate::model::rules::allowed;
+use crate::model::vocabulary::{Fact, NearWord, NumberWord, PastWord};
 use crate::model::{
     AMBIENT_MAX, COMMANDED_MAX, FnDef, Interval, RoadFacts, SINCE_S_MAX, TICK_MS, Type, Value,
 };
@@ -132,6 +133,18 @@ impl Values {
         }
     }
 
+    /// What is in both; all of `self` if that is nothing, since nearly equal numbers pass comparisons, too.
+    fn both(self, other: Values) -> Values {
+        match (self, other) {
+            (Values::Number(a), Values::Number(b)) if !a.intersect(&b).is_empty() => {
+                Values::Number(a.intersect(&b))
+            }
+            (Values::Variants(a), Values::Variants(b)) if a & b != 0 => Values::Variants(a & b),
+            (Values::Truth { may_hold: true, may_fail: true }, Values::Truth { .. }) => other,
+            _ => self,
+        }
+    }
+
     /// Everything in either.
     pub fn union(self, other: Values) -> Values {
         match (self, other) {
@@ -204,6 +217,15 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
             let locals: Vec<Values> = arguments.iter().map(values).collect();
             enclose(&known.functions[*function].body, &Known { locals: &locals, ..*known })
         }
+        ExprKind::OfNumbers(word, numbers) => {
+            let numbers: Vec<Interval> = numbers.iter().map(|number| values(number).interval()).collect();
+            Values::Number(match (word, numbers.as_slice()) {
+                (NumberWord::Min, [left, right]) => left.min(right),
+                (NumberWord::Max, [left, right]) => left.max(right),
+                (_, [number]) => number.max(&number.neg()).intersect(&Interval::NOT_NEGATIVE),
+                _ => Interval::ALL,
+            })
+        }
         ExprKind::Not(inner) => not(values(inner)),
         ExprKind::Negate(inner) => Values::Number(values(inner).interval().neg()),
         ExprKind::Arithmetic(Arithmetic::Subtract, left, right)
@@ -255,17 +277,97 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         ExprKind::IsWordOf(..) | ExprKind::IsBody(..) => Values::UNKNOWN_TRUTH,
         ExprKind::Match { subject, arm_of, arms } => {
             // Each arm is looked at once, however many variants take it, because nested `match`es would multiply.
-            let mut taken: u128 = 0;
-            let is_first = |arm: &usize| {
-                let bit = 1_u128.checked_shl(u32::try_from(*arm).unwrap_or(u32::MAX)).unwrap_or(0);
-                let is_first = bit == 0 || taken & bit == 0;
-                taken |= bit;
-                is_first
-            };
-            let arms_taken = bits(values(subject).variants()).map(|variant| arm_of[variant]);
-            let chosen = arms_taken.filter(is_first).map(|arm| values(&arms[arm]));
+            let mut taken: Vec<(usize, u128)> = Vec::new();
+            for variant in bits(values(subject).variants()) {
+                match taken.iter_mut().find(|(arm, _)| *arm == arm_of[variant]) {
+                    Some((_, variants)) => *variants |= 1 << variant,
+                    None => taken.push((arm_of[variant], 1 << variant)),
+                }
+            }
+            let chosen =
+                taken.into_iter().map(|(arm, variants)| within(&arms[arm], subject, variants, known));
             chosen.reduce(Values::union).unwrap_or_else(|| values(&arms[0]))
         }
+    }
+}
+
+/// All values of an arm of a `match`, which is taken where the subject is one of these variants: what the subject names has there
+/// only some of its values.
+fn within(arm: &Expr, subject: &Expr, variants: u128, known: &Known<'_>) -> Values {
+    let mut narrower = Vec::new();
+    match subject.ty {
+        // 1 is `false` alone, and 2 `true`.
+        Type::Bool if variants.is_power_of_two() => narrow(subject, variants == 2, known, &mut narrower),
+        Type::Enum(_) => narrower.push((subject, Values::Variants(variants))),
+        Type::Bool | Type::Int | Type::Quantity(_) => {}
+    }
+    narrower
+        .retain(|(name, _)| matches!(name.kind, ExprKind::Local(_) | ExprKind::Cell(_) | ExprKind::Fact(_)));
+    if narrower.is_empty() {
+        return enclose(arm, known);
+    }
+    effort::spend(known.locals.len() + known.cells.len());
+    let (mut locals, mut cells) = (known.locals.to_vec(), known.cells.to_vec());
+    let mut case = known.case.cloned().unwrap_or_default();
+    for (name, only) in narrower {
+        match name.kind {
+            ExprKind::Local(index) => locals[index] = locals[index].both(only),
+            ExprKind::Cell(cell) => cells[cell] = cells[cell].both(only),
+            ExprKind::Fact(fact) => {
+                let before = enclose(name, &Known { case: Some(&case), ..*known });
+                if let (Values::Number(piece), true) = (before.both(only), fact.ty() != Type::Bool) {
+                    case = case.with_number(fact, piece);
+                }
+            }
+            _ => {}
+        }
+    }
+    enclose(arm, &Known { locals: &locals, cells: &cells, case: Some(&case), ..*known })
+}
+
+/// What names may be where a condition is `truth`, as far as comparisons in it say so.
+fn narrow<'e>(condition: &'e Expr, truth: bool, known: &Known<'_>, found: &mut Vec<(&'e Expr, Values)>) {
+    effort::spend(1);
+    // A comparison fails, too, where a side has no value: then it says nothing of the other one.
+    let is_sure = |sides: [&Expr; 2]| truth || !sides.iter().any(|side| may_lack_a_value(side, known));
+    match &condition.kind {
+        ExprKind::Local(_) | ExprKind::Cell(_) => found.push((condition, Values::truth(truth))),
+        ExprKind::Not(inner) => narrow(inner, !truth, known, found),
+        ExprKind::And(left, right) if truth => {
+            narrow(left, true, known, found);
+            narrow(right, true, known, found);
+        }
+        ExprKind::Or(left, right) if !truth => {
+            narrow(left, false, known, found);
+            narrow(right, false, known, found);
+        }
+        ExprKind::Implies(left, right) if !truth => {
+            narrow(left, true, known, found);
+            narrow(right, false, known, found);
+        }
+        ExprKind::Compare(op, left, right) if is_sure([left, right]) => {
+            let op = if truth { *op } else { op.negated() };
+            // Measured numbers are equal if they are nearly so.
+            let is_exact = left.ty == Type::Int && right.ty == Type::Int;
+            for (name, op, other) in [(left, op, right), (right, op.mirrored(), left)] {
+                match enclose(other, known) {
+                    Values::Number(limit) if is_exact || op != Comparison::Equal => {
+                        found.push((name, Values::Number(allowed(op, &limit))));
+                    }
+                    only @ Values::Variants(_) if op == Comparison::Equal => found.push((name, only)),
+                    Values::Variants(set) if op == Comparison::NotEqual && set.is_power_of_two() => {
+                        found.push((name, Values::Variants(!set)));
+                    }
+                    Values::Number(_) | Values::Variants(_) | Values::Truth { .. } => {}
+                }
+            }
+        }
+        ExprKind::InRange(inner, low, high) if truth => {
+            for (op, end) in [(Comparison::GreaterEqual, low), (Comparison::LessEqual, high)] {
+                found.push((inner, Values::Number(allowed(op, &enclose(end, known).interval()))));
+            }
+        }
+        _ => {}
     }
 }
 
@@ -435,6 +537,49 @@ mod tests {
             let shares_all = left[0] - left[2] == right[0] - right[2] && left[1] == right[1];
             let is_sharp = !(found.may_hold() && found.may_fail());
             prop_assert!(is_sharp || !shares_all || matches!(op, Equal | NotEqual));
+        }
+
+        /// What an arm of a `match` gives lies within what is enclosed, however its condition narrows the values; so do the
+        /// lesser, the greater and the size of two numbers.
+        #[test]
+        fn an_arm_has_the_values_that_its_condition_leaves(
+            left in prop::array::uniform4(-3..4_i64), right in prop::array::uniform4(-3..4_i64),
+            low in prop::array::uniform2(-5..5_i64), wide in prop::array::uniform2(0..4_i64), at in prop::array::uniform2(0..4_i64),
+            limits in prop::array::uniform2(-6..6_i64), ops in prop::array::uniform2(0..6_usize), joined in 0..5_usize, word in 0..4_usize,
+        ) {
+            use Comparison::{Equal, Greater, GreaterEqual, Less, LessEqual, NotEqual};
+            let all = [Equal, NotEqual, Less, LessEqual, Greater, GreaterEqual];
+            let truth = |kind| Box::new(Expr { ty: Type::Bool, ..number(kind) });
+            let compared = |local: usize, other: Expr| {
+                let name = Box::new(number(ExprKind::Local(local)));
+                truth(ExprKind::Compare(all[ops[local]], name, Box::new(other)))
+            };
+            let limit = |of: usize| number(ExprKind::Number(Rational::integer(limits[of])));
+            // The second one is compared with the first one, too.
+            let (one, other) = (compared(0, limit(0)), compared(1, if word == 0 { number(ExprKind::Local(0)) } else { limit(1) }));
+            let subject = match joined {
+                0 => truth(ExprKind::And(one, other)),
+                1 => truth(ExprKind::Or(one, other)),
+                2 => truth(ExprKind::Implies(one, other)),
+                3 => truth(ExprKind::Not(truth(ExprKind::Or(one, other)))),
+                _ => one,
+            };
+            let sums = vec![sum(left), sum(right)];
+            let chosen = match word {
+                0 | 1 => sums[0].clone(),
+                2 => number(ExprKind::OfNumbers(NumberWord::Min, sums.clone())),
+                _ => number(ExprKind::OfNumbers(NumberWord::Abs, sums[..1].to_vec())),
+            };
+            let largest = number(ExprKind::OfNumbers(NumberWord::Max, sums));
+            let expr = number(ExprKind::Match { subject, arm_of: vec![1, 0], arms: vec![chosen, largest] });
+            let interval = |of: usize| {
+                Values::Number(Interval::closed(Rational::integer(low[of]), Rational::integer(low[of] + wide[of])))
+            };
+            let known = Known { functions: &[], locals: &[interval(0), interval(1)], cells: &[], road: None, case: None };
+            let values = [0, 1].map(|of| Value::Number((low[of] + at[of].min(wide[of])) as f64));
+            let found = evaluate(&expr, &[], &Facts::new(&values, &Memory::default())).number();
+            let found = Rational::integer(found as i64);
+            prop_assert!(enclose(&expr, &known).interval().contains(found), "{found:?}");
         }
     }
 }

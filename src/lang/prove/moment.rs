@@ -51,6 +51,13 @@ impl Case {
         Case { numbers: vec![(Fact::Elapsed, elapsed), (Fact::StepNumber, steps)], ..Case::default() }
     }
 
+    /// The same case, in which a fact is such a number.
+    pub fn with_number(&self, fact: Fact, piece: Interval) -> Case {
+        let mut case = self.clone();
+        case.numbers.insert(0, (fact, piece));
+        case
+    }
+
     pub fn number(&self, fact: Fact) -> Option<Interval> {
         self.numbers.iter().find(|(known, _)| *known == fact).map(|(_, piece)| *piece)
     }

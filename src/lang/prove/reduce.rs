@@ -41,6 +41,7 @@ pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr 
                 _ => ExprKind::CellAt(*first, key),
             }
         }
+        ExprKind::OfNumbers(word, numbers) => ExprKind::OfNumbers(*word, all(numbers)),
         ExprKind::Not(of) => ExprKind::Not(inner(of)),
         ExprKind::Negate(of) => ExprKind::Negate(inner(of)),
         ExprKind::Arithmetic(op, left, right) => ExprKind::Arithmetic(*op, inner(left), inner(right)),

@@ -187,6 +187,7 @@ pub(super) fn lacks_value(expr: &Expr, known: &Known<'_>) -> bool {
                 || lacks_value(left, known)
                 || lacks_value(right, known)
         }
+        ExprKind::OfNumbers(_, numbers) => numbers.iter().any(|number| lacks_value(number, known)),
         _ => false,
     }
 }

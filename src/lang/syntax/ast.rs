@@ -797,6 +797,18 @@ impl Comparison {
         }
     }
 
+    /// The comparison that holds where this one fails, if both sides have a value.
+    pub fn negated(self) -> Comparison {
+        match self {
+            Comparison::Equal => Comparison::NotEqual,
+            Comparison::NotEqual => Comparison::Equal,
+            Comparison::Less => Comparison::GreaterEqual,
+            Comparison::LessEqual => Comparison::Greater,
+            Comparison::Greater => Comparison::LessEqual,
+            Comparison::GreaterEqual => Comparison::Less,
+        }
+    }
+
     /// Whether it asks for an order, and not only whether both sides are the same.
     pub fn orders(self) -> bool {
         !matches!(self, Comparison::Equal | Comparison::NotEqual)

@@ -58,6 +58,9 @@ pub fn foreign(text: &str, token: usize, same_line: bool, failure: &Failure) -> 
     if let Some(found) = mark_at_number(text, token, same_line, failure) {
         return Some(found);
     }
+    if failure.expected.iter().any(|what| what.starts_with("a phase")) && word_at(text, token) == "when" {
+        return of_word(text, (token, token + "when".len()), ("write `once`".to_owned(), Some("once")));
+    }
     let word = word_at(text, token);
     if !word.is_empty() {
         let meant = if same_line { infix_word(word, failure)? } else { return None };

@@ -358,8 +358,10 @@ impl<'a> Judge<'a> {
         let shape = own(body).map_or_else(|| parameters(body.like), |own| own.shape);
         let verb = spawn.verb.word(functions, &facts);
         let behind_first_m = spawn.behind_first_m(shape.length_m, functions, &facts);
+        let is_first = behind_first_m == 0.0;
+        let first_asked_m = evaluate(&spawn.distance, functions, &facts).number();
         // Those who cross come one after the other to where the first meets the ego vehicle.
-        let (asked_m, behind_first_m) = match (evaluate(&spawn.distance, functions, &facts).number(), verb) {
+        let (asked_m, behind_first_m) = match (first_asked_m, verb) {
             (asked_m, Verb::CrossRoad) => (asked_m, behind_first_m),
             (asked_m, _) => (asked_m + behind_first_m, 0.0),
         };
@@ -369,6 +371,11 @@ impl<'a> Judge<'a> {
         let begins = begins.map(|_| self.begins(spawn, asked_m, locals));
         let figure = |expr: &Option<Expr>, bounds| {
             expr.as_ref().map(|expr| rounded_into(evaluate(expr, functions, &facts).number(), bounds))
+        };
+        let distance_m = |asked_m: f64| match spawn.of {
+            _ if begins.is_some() => 0.0,
+            None => rounded_into(asked_m, spawn_distance_m(verb)),
+            Some(of) => self.beside_m(of, spawn, asked_m, shape.length_m, verb, locals),
         };
         SpawnRequest {
             body: body.like,
@@ -380,11 +387,8 @@ impl<'a> Judge<'a> {
             side: spawn.side.word(functions, &facts),
             then: spawn.then.word(functions, &facts),
             speed_mps: rounded_into(evaluate(&spawn.speed, functions, &facts).number(), SPAWN_SPEED_MPS),
-            distance_m: match spawn.of {
-                _ if begins.is_some() => 0.0,
-                None => rounded_into(asked_m, spawn_distance_m(verb)),
-                Some(of) => self.beside_m(of, spawn, asked_m, shape.length_m, verb, locals),
-            },
+            distance_m: distance_m(asked_m),
+            first_m: (!is_first).then(|| distance_m(first_asked_m)),
             cover: cover.map(|cover| cover.like),
             offset_m: figure(&spawn.offset, OFFSET_M).unwrap_or(0.0),
             ignores: IgnoredRules::of(spawn.ignores.iter().map(|manner| manner.word(functions, &facts))),

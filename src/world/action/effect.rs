@@ -96,6 +96,8 @@ pub struct SpawnRequest {
     pub trajectory: Option<OnTrajectory>,
     /// How far it drives behind the first one of its row, m; for `CrossRoad`, where the distance is that of their meeting place.
     pub behind_first_m: f64,
+    /// The distance of the first one of its row, m, whose lane it shares; `None` for that one and for one alone.
+    pub first_m: Option<f64>,
     /// The name that it bears, by its index in the space.
     pub bearer: Option<usize>,
 }

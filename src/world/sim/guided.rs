@@ -40,6 +40,8 @@ pub(super) struct Guided {
     rate_mps2: f64,
     shift: Option<Shift>,
     meeting: Option<Meeting>,
+    /// By how much it misses the moment of its last `early`, s; below 0 if it is too soon.
+    pub late_s: Option<f64>,
 }
 
 /// A move to the side, by the smooth step of least jerk.
@@ -63,6 +65,13 @@ struct Meeting {
     /// For how long a way before the place it has it already, m.
     steady_m: f64,
     stage: Stage,
+    /// How fast the ego vehicle was at first, m/s; NaN once it has not kept that.
+    ego_mps: Option<f64>,
+}
+
+/// Whether the ego vehicle keeps a speed, m/s, as whoever is to meet it takes it to do: within a tenth and half a metre per second.
+pub(super) fn keeps_speed(first_mps: f64, now_mps: f64) -> bool {
+    (now_mps - first_mps).abs() <= 0.1 * first_mps + 0.5
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,7 +93,49 @@ impl Meeting {
             mps: command.speed_mps,
             steady_m: command.steady_m.unwrap_or(0.0),
             stage: Stage::Adapting,
+            ego_mps: None,
         })
+    }
+
+    /// By how much it misses the moment at least, with a body that gains and loses speed at most so fast, m/s², if the ego vehicle
+    /// keeps its speed, s: below 0 if it is too soon even if it brakes. `None` once the ego vehicle has not kept its speed.
+    fn late_s(
+        &mut self,
+        station_m: f64,
+        speed_mps: f64,
+        [gains_mps2, loses_mps2]: [f64; 2],
+        around: &Around,
+    ) -> Option<f64> {
+        let ego_mps = around.ego.speed_mps;
+        let first_mps = *self.ego_mps.get_or_insert(ego_mps);
+        if ego_mps < STANDING_MPS || !keeps_speed(first_mps, ego_mps) {
+            self.ego_mps = Some(f64::NAN);
+            return None;
+        }
+        let ego_m = self.ego_m - VehicleParameters::MKZ.front_m(around.ego_station_m);
+        let left_s = ego_m / ego_mps - self.early_s + DT_S;
+        let own_m = (self.reach_m - station_m).max(0.0);
+        let (way_m, steady_s, end_mps) = match self.mps {
+            Some(mps) if mps > 0.0 => ((own_m - self.steady_m).max(0.0), own_m.min(self.steady_m) / mps, mps),
+            _ => (own_m, 0.0, f64::INFINITY),
+        };
+        let squared = |mps: f64| mps * mps;
+        let (gain_m, loss_m) = (2.0 * gains_mps2, 2.0 * loses_mps2);
+        let reached_mps = (squared(speed_mps) + gain_m * way_m).sqrt();
+        let soonest_s = if reached_mps <= end_mps {
+            (reached_mps - speed_mps) / gains_mps2
+        } else {
+            // It gains speed up to some point, and then loses it again; one that is too fast only loses it.
+            let top_m = way_m + squared(speed_mps) / gain_m + squared(end_mps) / loss_m;
+            let top_mps = (top_m / (1.0 / gain_m + 1.0 / loss_m)).sqrt().max(speed_mps);
+            let lost_mps = top_mps - (squared(top_mps) - loss_m * way_m).max(squared(end_mps)).sqrt();
+            (top_mps - speed_mps) / gains_mps2 + lost_mps / loses_mps2
+        };
+        // One that can stop before the place may be there as late as it wants to.
+        let slowed = squared(speed_mps) - loss_m * way_m;
+        let latest_s = if slowed < 0.0 { f64::INFINITY } else { (speed_mps - slowed.sqrt()) / loses_mps2 };
+        let (too_late_s, too_soon_s) = (soonest_s + steady_s - left_s, latest_s + steady_s - left_s);
+        Some(if too_late_s > 0.0 { too_late_s } else { too_soon_s.min(0.0) })
     }
 
     /// The speed for the next tick; `None` once it is there, or the ego vehicle is.
@@ -155,6 +206,7 @@ impl Guided {
             rate_mps2: f64::INFINITY,
             shift: None,
             meeting: None,
+            late_s: None,
         }
     }
 
@@ -169,7 +221,11 @@ impl Guided {
     }
 
     pub fn order(&mut self, command: &Command) {
-        self.meeting = Meeting::told(command).or(self.meeting.filter(|_| command.speed_mps.is_none()));
+        let told = Meeting::told(command);
+        if told.is_some() {
+            self.late_s = None;
+        }
+        self.meeting = told.or(self.meeting.filter(|_| command.speed_mps.is_none()));
         if let Some(speed_mps) = command.speed_mps.filter(|_| command.early_s.is_none()) {
             self.wants_mps = speed_mps;
             self.rate_mps2 = command.rate_mps2.unwrap_or(f64::INFINITY);
@@ -216,7 +272,7 @@ impl Guided {
     }
 
     /// Where it is at the end of a tick. One that has `touched` the ego vehicle stays where it is.
-    pub fn step(&mut self, this: &Obstacle, touched: bool, around: &Around) -> Moved {
+    pub fn step(&mut self, this: &Obstacle, size: &BodyParameters, touched: bool, around: &Around) -> Moved {
         if touched {
             self.speed_mps = 0.0;
             return Moved::at_rest(this);
@@ -224,11 +280,26 @@ impl Guided {
         let before_mps = self.speed_mps;
         let mut is_at_once = false;
         if let Some(meeting) = &mut self.meeting {
+            // What brings it there in time may be more than its body can do.
+            let (gains_mps2, loses_mps2) =
+                (size.acceleration_mps2_max, around.braking_mps2(size, self.speed_mps));
+            // In its last part it goes on whatever the ego vehicle does.
+            if meeting.stage != Stage::Steady {
+                let late_s = meeting.late_s(self.station_m, self.speed_mps, [gains_mps2, loses_mps2], around);
+                self.late_s = late_s.or(self.late_s);
+            }
             match meeting.speed_mps(self.station_m, self.speed_mps, around) {
-                Some(speed_mps) => self.speed_mps = speed_mps,
+                Some(speed_mps) => {
+                    let range_mps = before_mps - loses_mps2 * DT_S..=before_mps + gains_mps2 * DT_S;
+                    self.speed_mps = speed_mps.clamp(*range_mps.start(), *range_mps.end());
+                }
                 None => {
                     self.wants_mps = meeting.mps.unwrap_or(self.speed_mps);
-                    self.rate_mps2 = f64::INFINITY;
+                    self.rate_mps2 = match self.wants_mps - self.speed_mps {
+                        lacks_mps if lacks_mps > 0.0 => gains_mps2,
+                        lacks_mps if lacks_mps < 0.0 => loses_mps2,
+                        _ => f64::INFINITY,
+                    };
                     self.meeting = None;
                 }
             }
@@ -293,13 +364,16 @@ impl Guided {
             // No tick changes these.
             way: _,
             to_middle_m: _,
+            // No tick reads it.
+            late_s: _,
         } = self;
         trace.numbers([*station_m, *left_m, *speed_mps, *wants_mps, *rate_mps2]);
         trace.flags([shift.is_some(), meeting.is_some()]);
         if let Some(Shift { from_m, to_m, takes_s, since_s }) = *shift {
             trace.numbers([from_m, to_m, takes_s, since_s]);
         }
-        if let Some(Meeting { ego_m, early_s, reach_m, mps, steady_m, stage }) = *meeting {
+        // No tick reads how fast the ego vehicle was.
+        if let Some(Meeting { ego_m, early_s, reach_m, mps, steady_m, stage, ego_mps: _ }) = *meeting {
             trace.word(stage as u64);
             trace.numbers([ego_m, early_s, reach_m, mps.unwrap_or(f64::INFINITY), steady_m]);
         }

@@ -330,6 +330,7 @@ fn facts(
         pet_s: TIME_S_MAX,
         station_m: 0.0,
         has_siren: false,
+        crashed: false,
         in_next_junction: false,
         leads: false,
         lanes_left: 0,

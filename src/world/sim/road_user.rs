@@ -569,6 +569,15 @@ impl Mover {
         self.touched || self.crashed_with.is_some()
     }
 
+    /// By how much it missed the moment of its last `early`, s; below 0 if it was too soon. `None` before that.
+    pub fn late_s(&self) -> Option<f64> {
+        match &self.motion {
+            Motion::Drive(driver) => driver.late_s,
+            Motion::Guide(guided) => guided.late_s.filter(|_| guided.has_met()),
+            Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => None,
+        }
+    }
+
     /// Whether it is an emergency vehicle under way.
     pub fn has_siren(&self) -> bool {
         matches!(&self.motion, Motion::Drive(driver) if driver.has_siren)
@@ -636,7 +645,7 @@ impl Mover {
             Motion::Walk(walker) => walker.step(this, in_sight || self.course.is_some(), around),
             Motion::Stroll(stroller) => stroller.step(this, in_sight || self.course.is_some(), around),
             Motion::Guide(guided) => {
-                let moved = guided.step(this, self.touched, around);
+                let moved = guided.step(this, &self.size, self.touched, around);
                 self.rights.passed.pass_freely(this, &moved, around);
                 Some(moved)
             }

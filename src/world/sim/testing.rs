@@ -97,6 +97,7 @@ pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
         early_s: None,
         trajectory: None,
         behind_first_m: 0.0,
+        first_m: None,
         bearer: None,
     }
 }

@@ -15,6 +15,7 @@ use super::{
 };
 use crate::action::{Effect, SpawnRequest, Surroundings};
 use avastra_base::geometry::{Vec2, distance_m, wrap_angle};
+use avastra_lang::model::body::{Changes, OwnBody, parameters};
 use avastra_lang::model::vocabulary::{Body, LaneChoice, Level, Light, Phenomenon, Side, Then, Verb, Word};
 
 /// Holds a speed and the route, whatever is in the way, by aiming at a point ahead (pure pursuit).
@@ -283,6 +284,31 @@ fn a_pedestrian_steps_out_from_behind_a_parked_vehicle() {
     assert_eq!(world.obstacle(walker + 1).map(|truck| truck.outline), Some(parked.outline));
     let driver = SpawnRequest { cover: Some(Body::SUV), ..request(Verb::DriveAhead, 90.0, 5.0) };
     assert!(world.survey(&driver).is_err_and(|why| why.starts_with("only a pedestrian")));
+}
+
+#[test]
+fn a_wall_hides_who_is_behind_it_up_to_its_height() {
+    for (height_m, shown) in [(2.5, 0.0), (1.05, 0.4)] {
+        let mut world = testing::world(&testing::straight());
+        let changes = Changes {
+            length_m: Some(12.0),
+            width_m: Some(0.3),
+            height_m: Some(height_m),
+            ..Changes::default()
+        };
+        let shape = parameters(Body::Object).changed(&changes);
+        let stands = |body, distance_m, offset_m| SpawnRequest {
+            body,
+            offset_m,
+            ..request(Verb::Stand, distance_m, 0.0)
+        };
+        let wall = stands(Body::Object, 40.0, -5.0);
+        spawn(&mut world, SpawnRequest { own: Some(OwnBody { index: 0, shape }), ..wall });
+        let hidden = spawn(&mut world, stands(Body::Pedestrian, 51.0, -6.2)).id;
+        let sensed = world.sensed();
+        let seen = sensed.objects.iter().find(|object| object.id == hidden).expect("it is in range");
+        assert!((seen.visible_fraction - shown).abs() < 1e-9, "{height_m} m: {}", seen.visible_fraction);
+    }
 }
 
 #[test]

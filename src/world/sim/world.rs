@@ -324,7 +324,8 @@ impl World {
     pub fn npc_facts(&self, id: u32) -> Option<NpcFacts> {
         let user = self.users.iter().find(|user| user.obstacle.id == id)?;
         let facts = npc_facts(&self.alone(), &user.obstacle, &user.mover.motion);
-        Some(NpcFacts { priority: user.mover.rights.now(self.ticks), ..facts })
+        let (priority, crashed) = (user.mover.rights.now(self.ticks), user.mover.has_crashed());
+        Some(NpcFacts { priority, crashed, ..facts })
     }
 
     /// Whether the road user with an id ignores a rule of the road; false if it is not there, or on foot.
@@ -356,6 +357,11 @@ impl World {
         let user = self.users.iter().find(|user| user.obstacle.id == id);
         let progress = user.and_then(|user| user.mover.motion.progress(&self.alone()));
         progress.is_some_and(|progress| progress.meets(command))
+    }
+
+    /// By how much the road user with an id missed the moment of its last `early`, s; below 0 if it was too soon.
+    pub fn late_s(&self, id: u32) -> Option<f64> {
+        self.users.iter().find(|user| user.obstacle.id == id)?.mover.late_s()
     }
 
     /// The id of the latest bearer of a name, if one is there.

@@ -39,6 +39,17 @@ export interface Summary {
   refuted: { claim: string; confirmed: boolean | null; found: string }[];
   same: boolean | null;
   breaches: Breach[];
+  crashes: Crash[];
+}
+
+/** Two road users crash into each other, not into the ego vehicle. */
+export interface Crash {
+  at_s: number;
+  x_m: number;
+  y_m: number;
+  obstacle: number;
+  other: number;
+  text: string;
 }
 
 /** How often a finding recurs under other noise. */

@@ -32,10 +32,17 @@ export function showVerdict(place, recording, seek, watchDrivers) {
   if (parts.length === 0)
     parts.push(el("p", {}, `No collision: ${ENDS[summary.end] ?? `it ended with ${summary.end}`}.`));
   parts.push(...summary.breaches.map((breach) => broken(breach, seek)));
+  parts.push(...summary.crashes.map((crash) => crashed(crash, seek)));
   if (summary.same && summary.refuted.length === 0) {
     parts.push(el("p", { class: "muted" }, "This replay equals the recorded episode in every bit of every tick."));
   }
   refill(place, parts);
+}
+
+/** Two others crash into each other. */
+function crashed(crash, seek) {
+  const jump = el("button", { type: "button", onclick: () => seek(crash.at_s) }, `Go to ${atTime(crash.at_s)}`);
+  return el("section", {}, el("p", {}, `${crash.text}.`), el("p", { class: "buttons" }, jump));
 }
 
 /** A requirement that was not kept: what it asks, for how long it was broken, who keeps it. */

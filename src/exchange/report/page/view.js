@@ -147,7 +147,8 @@ export class View {
   }
 
   #impacts(timeS) {
-    for (const collision of this.recording.header.collisions) {
+    const { collisions, summary } = this.recording.header;
+    for (const collision of [...collisions, ...summary.crashes]) {
       const since = timeS - collision.at_s;
       if (since >= -1e-6 && since <= IMPACT_SHOWN_S) drawImpact(this.canvas, this.recording.impact(collision));
     }

@@ -6,13 +6,13 @@
 //! polynomials may be found, never too few.
 
 use crate::model::effort;
-use crate::model::eval::{Facts, arithmetic, compare, evaluate};
+use crate::model::eval::{Facts, arithmetic, compare, evaluate, of_numbers};
 use crate::model::expr::{Arithmetic, Expr, ExprKind};
 use crate::model::rules::polynomial::Polynomial;
 use crate::model::rules::{Clause, Demand, RowRules, Source, state_at};
 use crate::model::space::{FnDef, SetDef, StateDef};
 use crate::model::value::Value;
-use crate::model::vocabulary::Known;
+use crate::model::vocabulary::{Known, NumberWord};
 
 /// The most forms that one expression may have, by the arms of its `match`es.
 const FORMS_MAX: usize = 64;
@@ -156,6 +156,24 @@ impl Reader<'_> {
                     }
                     None => self.read(body, &given)?,
                 }
+            }
+            ExprKind::OfNumbers(word, numbers) => {
+                let mut forms =
+                    numbers.iter().map(|number| self.read(number, locals)).collect::<Option<Vec<_>>>()?;
+                let known = forms.iter().map(|form| match form {
+                    Form::Known(value) => Some(value.number()),
+                    Form::Numbers(_) | Form::Open => None,
+                });
+                if let Some(known) = known.collect::<Option<Vec<f64>>>() {
+                    return Some(Form::Known(Value::Number(of_numbers(*word, known.into_iter()))));
+                }
+                if *word == NumberWord::Abs {
+                    let negated = forms[0].quotients()?.into_iter().map(|form| form.scaled(-1.0)).collect();
+                    forms.push(Form::Numbers(negated));
+                }
+                // It changes from one to the other where both are equal.
+                self.compared(&forms[0], &forms[1])?;
+                join(forms)?
             }
             ExprKind::Not(inner) => match self.read(inner, locals)? {
                 Form::Known(value) => Form::Known(Value::Bool(!value.truth())),

@@ -108,6 +108,7 @@ impl Driver {
     /// one that has not begun; what is under way is finished first.
     pub fn order(&mut self, command: &Command, to: Option<u32>) {
         if let Some(pursuit) = Pursuit::told(command, to) {
+            self.late_s = None;
             (self.pursuit, self.ordered_mps2) = (Some(Box::new(pursuit)), command.rate_mps2);
         } else if let Some(speed_mps) = command.speed_mps {
             (self.cruise_mps, self.ordered_mps2) = (speed_mps, command.rate_mps2);

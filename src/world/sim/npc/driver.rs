@@ -92,6 +92,8 @@ pub(in crate::sim) struct Driver {
     pub has_siren: bool,
     /// What it was told to do beside the ego vehicle. It says the speed, in place of `cruise_mps`.
     pub(super) pursuit: Option<Box<Pursuit>>,
+    /// By how much it missed the moment of its last `early`, s; below 0 if it was too soon.
+    pub late_s: Option<f64>,
     /// Where it was told to go at the next junction.
     pub(super) turn: Option<MeantTurn>,
     pub(super) last_change: Option<Side>,
@@ -145,6 +147,7 @@ impl Driver {
             ignores: IgnoredRules::default(),
             has_siren: false,
             pursuit: None,
+            late_s: None,
             turn: None,
             last_change: None,
             plan,
@@ -370,6 +373,8 @@ impl Driver {
             way: _,
             // Rules permit what is then seen in `change`.
             lane_changes: _,
+            // No tick reads it.
+            late_s: _,
         } = self;
         trace.flags([
             leader.is_some(),

@@ -2,13 +2,14 @@
 //! or to be at a place so much before the ego vehicle. Both say the speed, from tick to tick, as OpenSCENARIO's continuous
 //! `LongitudinalDistanceAction` and its `SynchronizeAction` do. Lights, bends and others may still make a vehicle slower.
 
-use avastra_base::kinematics::{braking_m, needed_mps2};
+use avastra_base::kinematics::{STANDING_MPS, braking_m, needed_mps2};
 use avastra_lang::model::command::Command;
 use avastra_road::LaneIndex;
 
 use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
+use crate::sim::guided::keeps_speed;
 use crate::sim::road_user::Obstacle;
 use crate::sim::trace::Trace;
 use crate::sim::world::DT_S;
@@ -35,6 +36,10 @@ pub(super) struct Pursuit {
     crosses_in: Option<LaneIndex>,
     /// Whether the gap was as wanted once.
     is_met: bool,
+    /// By how much it misses its moment if both go on as they do, s; `None` if the ego vehicle has not kept its speed.
+    late_s: Option<f64>,
+    /// How fast the ego vehicle was at first, m/s; NaN once it has not kept that.
+    ego_mps: Option<f64>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -68,11 +73,19 @@ impl Pursuit {
         let Command { speed_mps: speed_mps_max, keep_m, keep_s, early_s, at_m, .. } = *command;
         let gap = keep_m.map(Gap::Way).or(keep_s.map(Gap::Time)).map(|gap| Aim::Gap(gap, to));
         let place = early_s.map(|early_s| Aim::Place { early_s, station_m: at_m });
-        Some(Pursuit { aim: gap.or(place)?, speed_mps_max, crosses_in: None, is_met: false })
+        Some(Pursuit {
+            aim: gap.or(place)?,
+            speed_mps_max,
+            crosses_in: None,
+            is_met: false,
+            late_s: None,
+            ego_mps: None,
+        })
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        let Pursuit { aim, speed_mps_max, crosses_in, is_met } = *self;
+        // No tick reads by how much it is late.
+        let Pursuit { aim, speed_mps_max, crosses_in, is_met, late_s: _, ego_mps: _ } = *self;
         let (kind, to, numbers) = match aim {
             Aim::Gap(Gap::Way(gap_m), to) => (0, to, [gap_m, 0.0]),
             Aim::Gap(Gap::Time(gap_s), to) => (1, to, [gap_s, 0.0]),
@@ -153,6 +166,7 @@ impl Driver {
                     // Behind the place it keeps the speed that it has.
                     if pursuit.crosses_in.is_some() || station_m.is_some() {
                         self.cruise_mps = self.speed_mps;
+                        self.late_s = pursuit.late_s;
                         self.pursuit = None;
                     }
                     return None;
@@ -161,6 +175,12 @@ impl Driver {
                 let left_s = ego_m / around.ego.speed_mps - early_s;
                 // The ego vehicle has moved in this tick already.
                 let left_s = left_s + DT_S;
+                let first_mps = pursuit.ego_mps.get_or_insert(around.ego.speed_mps);
+                if around.ego.speed_mps < STANDING_MPS || !keeps_speed(*first_mps, around.ego.speed_mps) {
+                    *first_mps = f64::NAN;
+                }
+                let is_kept = !first_mps.is_nan();
+                pursuit.late_s = is_kept.then(|| own_m / self.speed_mps.max(STANDING_MPS) - left_s);
                 let needed_mps = if left_s > DT_S { own_m / left_s } else { f64::INFINITY };
                 (needed_mps.min(speed_mps_max) - self.speed_mps) / TAKES_S
             }

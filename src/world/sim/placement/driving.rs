@@ -23,6 +23,10 @@ const CUT_IN_M: f64 = 5.0;
 /// How far in front of the ego vehicle an overtaker that only wants to pass comes back to its lane, m: two seconds in town.
 /// Ours.
 const RETURN_M: f64 = 20.0;
+/// The lane of a row is followed for this part of the row's length, and so much more, m: a lane outside a bend is longer than the
+/// route. Ours.
+const ROW_PART: f64 = 1.2;
+const ROW_M: f64 = 30.0;
 
 pub(super) fn drive_ahead(asked: &Asked) -> Result<Driver, String> {
     let Asked { around, request, id, .. } = *asked;
@@ -30,13 +34,62 @@ pub(super) fn drive_ahead(asked: &Asked) -> Result<Driver, String> {
     if request.lane == LaneChoice::Current && request.distance_m < 0.0 {
         return Err("in the ego vehicle's own lane nobody begins beside it".into());
     }
-    let lane = chosen_lane(around, station_m, request.lane)?;
+    let lane = lane_of_row(asked, station_m, true, |station_m| chosen_lane(around, station_m, request.lane))?;
     let mut rng = choices(around.seed, id, 0);
     let beside_ego = around.scene.route.path.pose_at(station_m).position;
     let station_m = around.scene.map.lane(lane).centre.project(beside_ego).station_m;
     let (way, turns_in) = way_of(asked, &[lane], &mut rng)?;
     let plan = change_soon(asked, &way, station_m, lane, &mut rng)?;
     Ok(commanded(asked, way, turns_in, station_m, plan))
+}
+
+/// The lane of one that is at this station of the route: `choose` finds it for one alone. Others of a row are in the lane of the
+/// first one, or in one that this leads to (against the direction of the route: that leads to this): where the route changes its
+/// lane or the road gains one, `choose` alone would put a row into two.
+///
+/// # Errors
+/// That there is no such lane, in words.
+fn lane_of_row(
+    asked: &Asked,
+    station_m: f64,
+    forward: bool,
+    choose: impl Fn(f64) -> Result<LaneIndex, String>,
+) -> Result<LaneIndex, String> {
+    let Asked { around, request, .. } = *asked;
+    let Some(first_m) = request.first_m else { return choose(station_m) };
+    let row_m = request.distance_m - first_m;
+    let first = choose(station_m - row_m)?;
+    let map = &around.scene.map;
+    let far_m = ROW_PART * row_m.abs() + ROW_M;
+    // The lanes that lead on from the first one's, each with how far that is at the most.
+    let mut reached = vec![(first, 0.0)];
+    let mut at = 0;
+    while at < reached.len() {
+        let (lane, begin_m) = reached[at];
+        let lane = map.lane(lane);
+        let end_m = if at == 0 { 0.0 } else { begin_m + lane.centre.length_m() };
+        at += 1;
+        let next = if forward == (row_m >= 0.0) { &lane.successors } else { &lane.predecessors };
+        for lane in next.iter().filter(|_| end_m <= far_m) {
+            if !reached.iter().any(|(known, _)| known == lane) {
+                reached.push((*lane, end_m));
+            }
+        }
+    }
+    let leads_to = |wanted: &LaneIndex| reached.iter().any(|(lane, _)| lane == wanted);
+    if let Some(lane) = choose(station_m).ok().filter(leads_to) {
+        return Ok(lane);
+    }
+    let beside = around.scene.route.path.pose_at(station_m).position;
+    let away_m = |lane: &LaneIndex| {
+        let centre = &map.lane(*lane).centre;
+        let place = centre.project(beside);
+        let is_on_it = place.station_m > 0.0 && place.station_m < centre.length_m();
+        is_on_it.then_some(place.offset_m.abs())
+    };
+    let nearest = reached.iter().filter_map(|(lane, _)| Some((*lane, away_m(lane)?)));
+    let nearest = nearest.min_by(|(_, a_m), (_, b_m)| a_m.total_cmp(b_m));
+    nearest.map(|(lane, _)| lane).ok_or("the lane of its row ends before that place".into())
 }
 
 /// The lane change of a vehicle that drives in the ego vehicle's direction, if it was asked for one.
@@ -160,7 +213,9 @@ pub(super) fn drive_opposite(asked: &Asked) -> Result<Driver, String> {
     let Asked { around, request, id, .. } = *asked;
     let station_m = ahead_m(asked)?;
     let map = &around.scene.map;
-    let inner = lane_along(around, station_m, false, |lane| opposing_lane(around, lane, station_m))?;
+    let opposing =
+        |station_m| lane_along(around, station_m, false, |lane| opposing_lane(around, lane, station_m));
+    let inner = lane_of_row(asked, station_m, false, opposing)?;
     let mut rng = choices(around.seed, id, 0);
     let (lane, plan) = match request.then {
         Then::Keep => (inner, Vec::new()),

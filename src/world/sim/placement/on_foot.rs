@@ -42,7 +42,8 @@ struct Crossing {
 /// A pedestrian who crosses the whole road, who walks along it, or who stands on it.
 pub(super) fn on_foot(asked: &Asked) -> Result<Newcomers, String> {
     let Asked { around, request, .. } = *asked;
-    if around.scene.is_motorway {
+    // A thing may lie or stand there: a lost load, a wall.
+    if around.scene.is_motorway && request.body != Body::Object {
         return Err("nobody goes on foot on a motorway".into());
     }
     let asked_m = ahead_m(asked)?;
