@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
+use avastra_base::outside::Shown;
 use avastra_exchange::report::draw;
 use avastra_road::{Lane, LaneIndex, LaneKey, LanePlace, Neighbour, RoadMap, Route, Side, SignKind};
 
@@ -68,7 +69,7 @@ fn read(output: &Output, arguments: &RoadArguments) -> Result<(Arc<RoadMap>, Opt
         let named = |name: &String| roads.iter().find(|road| road.name == *name);
         let road = arguments.road.as_ref().map_or(roads.first(), named).ok_or_else(|| {
             let names: Vec<_> = roads.iter().map(|road| format!("`{}`", road.name)).collect();
-            let (path, names) = (path.display(), names.join(", "));
+            let (path, names) = (path.shown(), names.join(", "));
             Failure::usage(if names.is_empty() {
                 format!("`{path}` declares no road")
             } else {

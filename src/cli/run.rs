@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use avastra_base::outside::Shown;
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::oracle;
@@ -80,7 +81,7 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
         None => begun(output, arguments)?,
     };
     let Some((run, directory)) = begun else { return Ok(()) };
-    output.tell(&format!("{}, into {}", heading(&run, arguments), directory.path.display()));
+    output.tell(&format!("{}, into {}", heading(&run, arguments), directory.path.shown()));
     let found = play_all(output, run, directory, arguments.jobs)?;
     if arguments.fail_on_collision && found.counted > 0 {
         return Err(Failure::Collision { collisions: found.counted as usize });
@@ -162,7 +163,7 @@ fn play_all(
         output.say(&protocol::in_words(&tests));
     }
     if let [table, cases] = tables.as_slice() {
-        output.say(&format!("each row: {}, {}", table.display(), cases.display()));
+        output.say(&format!("each row: {}, {}", table.shown(), cases.shown()));
     }
     let never = Never::new(run.table(), &directory.read(Database::rows)?);
     // A protocol says of each row what came of it.
@@ -176,12 +177,12 @@ fn play_all(
         let kept = plural(kept.len(), "episode");
         output.say(&format!(
             "{kept} without a finding, the nearest misses first, in {}/kept",
-            directory.path.display()
+            directory.path.shown()
         ));
     }
     let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {
-        let place = format!("; each is in {}/failures", directory.path.display());
+        let place = format!("; each is in {}/failures", directory.path.shown());
         output.say(&failures_text(&failures, &place));
     }
     if let Some(program) = program
@@ -292,7 +293,7 @@ fn ready(
     let labels =
         |table: &ActionTable| -> Vec<String> { table.rows().iter().map(|row| row.label.clone()).collect() };
     if labels(own) != labels(&table) {
-        let (name, path) = (&policy.name, table.space().path.display());
+        let (name, path) = (&policy.name, table.space().path.shown());
         return Err(Failure::usage(format!(
             "`{name}` was trained for another action table than that of `{path}`"
         )));
@@ -354,10 +355,10 @@ fn heading(run: &Run, arguments: &RunArguments) -> String {
     });
     let ads = run.arena().ads_name();
     let profile = load::profile_path(&arguments.under_test.ads)
-        .map_or(String::new(), |path| format!(" with {}", path.display()));
+        .map_or(String::new(), |path| format!(" with {}", path.shown()));
     format!(
         "{}: {} against {}{profile}, {} on {}{ambient}{traffic}, seed {}",
-        run.space().path.display(),
+        run.space().path.shown(),
         settings.agent,
         ads,
         plural(if settings.rows > 0 { run.episodes() } else { settings.episodes as usize }, "episode"),
@@ -528,7 +529,7 @@ pub fn critical_text(directory: &Path, files: &[PathBuf], found: &[FoundIn]) -> 
         ];
         let told: Vec<String> = told.into_iter().flatten().collect();
         let told = if told.is_empty() { String::new() } else { format!("  {}", told.join(", ")) };
-        format!("{}{told}", file.display())
+        format!("{}{told}", file.shown())
     };
     let head = format!("\n{} with a counted collision or a breach:", plural(files.len(), "scenario"));
     let mut text = cut_short(head, files, line, |more| format!("and {more} more"));
