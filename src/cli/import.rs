@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use avastra_base::outside::Shown;
+use avastra_base::outside::{Shown, in_line};
 use avastra_campaign::episode::{End, Outcome};
 use avastra_campaign::files::PlainName;
 use avastra_campaign::run::{Stage, recorded};
@@ -45,7 +45,7 @@ pub fn import(output: &Output, arguments: &ImportArguments) -> Result<(), Failur
                     space.iter().chain(scenario).map(|path| path.shown().to_string()).collect();
                 output.say(&format!("{}: {}", file.shown(), paths.join(", ")));
                 for note in &taken.notes {
-                    output.tell(&format!("  {note}"));
+                    output.tell(&format!("  {}", in_line(note)));
                 }
                 results.push(serde_json::json!({
                     "file": file, "space": space, "scenario": scenario, "notes": taken.notes, "refused": [],
@@ -58,6 +58,7 @@ pub fn import(output: &Output, arguments: &ImportArguments) -> Result<(), Failur
                         Some(scenario) => folder_of(file).join(slashed(scenario)),
                         None => file.clone(),
                     };
+                    let (element, reason) = (in_line(element), in_line(reason));
                     output.say(&format!("{}:{line}: {element}: {reason}", place.shown()));
                 }
                 results.push(serde_json::json!({
