@@ -1,5 +1,7 @@
-//! What all other crates count with. It knows no roads, no vehicles and no text.
+//! What all other crates count and write with. It knows no roads and no vehicles.
 //!
+//! - [`outside`]: texts from outside, and one function for each place where they may stand.
+//! - [`threads`]: work on as many threads as the system gives, with results in order.
 //! - [`units`]: exact numbers with dimensions, at the language's edge; inside, everything is SI and `f64`.
 //! - [`rng`]: one stream of chance for each consumer, by seed and number.
 //! - [`statistics`]: intervals, rank tests and survival of samples.
@@ -14,6 +16,8 @@
 //! assert_ne!(drawn(7), drawn(8));
 //! ```
 
+pub mod outside;
+pub mod threads;
 pub mod units;
 pub mod rng;
 pub mod statistics;

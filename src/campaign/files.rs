@@ -10,16 +10,19 @@
 //!
 //! Only a path that the user named to be written (`--out`, `--resume`) is followed wherever it leads ([`write_named`], [`make`]).
 //! A file that is to be changed (`fmt`, `check --fix`) is between the two: it may be a link itself, on the way to it there is none.
+//! A file that is there keeps its rights, its owner and its further names; a read-only one is refused.
 //!
 //! A process that changes the directory at the same moment is not guarded against: it has the user's rights already.
 //! Files are read in `cli::load`.
 
-use std::fs::{File, Metadata};
+use avastra_base::outside::Shown;
+use std::collections::BTreeSet;
+use std::fs::{File, Metadata, TryLockError};
 use std::io::{Error, ErrorKind, Read, Result, Write};
-use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt, fchown};
 use std::path::{Component, Path, PathBuf};
-use std::sync::LazyLock;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{LazyLock, Mutex};
 
 use nix::errno::Errno;
 use nix::fcntl::OFlag;
@@ -33,6 +36,9 @@ pub use std::fs::{create_dir as make_new, create_dir_all as make, remove_dir as 
 
 /// Longest name of a file that common file systems take, in bytes.
 const NAME_BYTES_MAX: usize = 255;
+
+/// Bytes of two files that are compared at once.
+const CHUNK: usize = 32 << 10;
 
 /// Ending of the names of files that are not whole yet.
 const ENDING: &str = ".partial";
@@ -112,6 +118,45 @@ impl AsRef<Path> for PlainName {
     }
 }
 
+/// A file or a folder that no other process has as long as this lives. The lock ends with the process however that ends.
+pub struct Lock {
+    /// Nothing where files cannot be locked, as on some network drives: there is no lock.
+    file: Option<File>,
+}
+
+impl Lock {
+    /// Locks a folder.
+    ///
+    /// # Errors
+    /// If another process has it: [`ErrorKind::WouldBlock`].
+    pub fn of_folder(path: &Path) -> Result<Lock> {
+        File::open(path).map_or(Ok(Lock { file: None }), Lock::of)
+    }
+
+    /// Locks a file of ours, which is made if it is not there.
+    ///
+    /// # Errors
+    /// As [`Lock::of_folder`], and if the file is a link or cannot be made.
+    pub fn of_file(path: &Path) -> Result<Lock> {
+        own_file(path)?;
+        Lock::of(File::options().create(true).append(true).custom_flags(OFlag::O_NOFOLLOW.bits()).open(path)?)
+    }
+
+    fn of(file: File) -> Result<Lock> {
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => Err(ErrorKind::WouldBlock.into()),
+            _ => Ok(Lock { file: Some(file) }),
+        }
+    }
+
+    /// Whether what is locked has this path. It may have been removed before it was locked.
+    pub fn is_at(&self, path: &Path) -> bool {
+        let locked = self.file.as_ref().and_then(|file| file.metadata().ok());
+        let there = std::fs::symlink_metadata(path).ok();
+        locked.zip(there).is_some_and(|(one, other)| (one.dev(), one.ino()) == (other.dev(), other.ino()))
+    }
+}
+
 /// A new file beside its destination. Dropping this removes the file unless it was moved to the destination.
 pub struct Temporary {
     path: PathBuf,
@@ -182,22 +227,49 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     temporary.take_place_of(path)
 }
 
-/// Writes a file that the user named. Its folders are made, and a symbolic link is followed. A pipe, a terminal or the null
-/// device is written to and not replaced.
+/// Writes a file that the user named. Its folders are made, and a symbolic link is followed. A file that is there keeps its
+/// rights, its owner and its further names. A pipe, a terminal or the null device is written to and not replaced.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write`], and if the file that is there is read-only.
 pub fn write_named(path: &Path, bytes: &[u8]) -> Result<()> {
-    if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
-        let _reader = is_read(path)?;
-        return std::fs::write(path, bytes);
-    }
-    let followed = std::fs::canonicalize(path);
-    if followed.is_err() && path.is_symlink() {
-        return Err(Error::other("it is a link to a file that does not exist"));
+    match std::fs::metadata(path) {
+        Ok(found) if found.is_file() => return write_over(&std::fs::canonicalize(path)?, &found, bytes),
+        Ok(_) => {
+            let _reader = is_read(path)?;
+            return std::fs::write(path, bytes);
+        }
+        Err(_) if path.is_symlink() => {
+            return Err(Error::other("it is a link to a file that does not exist"));
+        }
+        Err(_) => {}
     }
     make(folder_of(path))?;
-    write(followed.as_deref().unwrap_or(path), bytes)
+    write(path, bytes)
+}
+
+/// Writes a file anew. Where another file in its place would be less than it was, because it has further names or another owner,
+/// the file itself is written: then a kill can leave it half written.
+fn write_over(path: &Path, found: &Metadata, bytes: &[u8]) -> Result<()> {
+    // Whoever administers a system may write it all the same.
+    if found.permissions().readonly() {
+        return Err(Error::other("it is read-only"));
+    }
+    let mut there = File::options().write(true).open(path)?;
+    sweep_once(folder_of(path));
+    let (temporary, mut file) = Temporary::beside(path)?;
+    let is_alike = found.nlink() == 1 && fchown(&file, Some(found.uid()), Some(found.gid())).is_ok();
+    // Before there is anything to read in it.
+    file.set_permissions(found.permissions())?;
+    file.write_all(bytes)?;
+    file.sync_all()?;
+    if is_alike {
+        return temporary.take_place_of(path);
+    }
+    // That the disk has room for it was tried with the other file, which goes now.
+    there.write_all(bytes)?;
+    there.set_len(bytes.len() as u64)?;
+    there.sync_all()
 }
 
 /// Writes a new file. A file or a link that is there already stays as it is.
@@ -293,7 +365,7 @@ pub fn without_links(path: &Path) -> Result<()> {
         if folder.is_symlink() && !is_of_system {
             return Err(Error::other(format!(
                 "`{}` on the way to it is a symbolic link, which may lead anywhere: name the path that it leads to",
-                folder.display()
+                folder.shown()
             )));
         }
     }
@@ -315,6 +387,42 @@ pub fn first_bytes(path: &Path, count: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// Refuses a file that has further names. SQLite writes into its journal, and another name of it may be a file of the user's.
+///
+/// # Errors
+/// If it has.
+pub fn without_further_names(path: &Path) -> Result<()> {
+    match std::fs::symlink_metadata(path) {
+        Ok(found) if found.nlink() > 1 => Err(Error::other(
+            "it has a further name (hard link), which may be another file of yours: remove it",
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Whether two regular files hold the same bytes. Anything else, a link for example, is equal to nothing.
+///
+/// # Errors
+/// If one of them is not there or cannot be read.
+pub fn are_equal(one: &Path, other: &Path) -> Result<bool> {
+    let length = |path| std::fs::symlink_metadata(path).map(|found| found.is_file().then_some(found.len()));
+    let (Some(length), true) = (length(one)?, length(one)? == length(other)?) else { return Ok(false) };
+    let mut files = [File::open(one)?, File::open(other)?];
+    let mut read = [[0; CHUNK], [0; CHUNK]];
+    let mut left = length;
+    while left > 0 {
+        let next = left.min(CHUNK as u64) as usize;
+        for (file, bytes) in files.iter_mut().zip(&mut read) {
+            file.read_exact(&mut bytes[..next])?;
+        }
+        if read[0][..next] != read[1][..next] {
+            return Ok(false);
+        }
+        left -= next as u64;
+    }
+    Ok(true)
+}
+
 fn own(path: &Path, fits: fn(&Metadata) -> bool, otherwise: &'static str) -> Result<()> {
     match std::fs::symlink_metadata(path) {
         Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(()),
@@ -330,6 +438,11 @@ pub fn is_partial(name: &str, of: &str) -> bool {
     name.strip_prefix(of).is_some_and(|rest| rest.starts_with('.') && rest.ends_with(ENDING))
 }
 
+/// Whether this is the name of a temporary file, of whatever file, process and machine.
+pub fn is_temporary(name: &str) -> bool {
+    maker_of(name).is_some()
+}
+
 /// Removes the temporary files that killed processes of this machine left in a folder. Those of running processes stay, and
 /// those of other machines, of which it is not known whether they run.
 ///
@@ -338,8 +451,9 @@ pub fn is_partial(name: &str, of: &str) -> bool {
 pub fn sweep(folder: &Path) -> Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
-        let writer = entry.file_name().to_str().and_then(writer_of);
-        let is_left = writer.is_some_and(|process| !runs(process));
+        let name = entry.file_name();
+        let maker = name.to_str().and_then(maker_of);
+        let is_left = maker.is_some_and(|(machine, process)| machine == *MACHINE && !runs(process));
         if is_left && entry.file_type().is_ok_and(|kind| kind.is_file()) {
             remove(&entry.path())?;
         }
@@ -347,14 +461,40 @@ pub fn sweep(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The number of the process of this machine that made a temporary file, from the file's name.
-fn writer_of(name: &str) -> Option<i32> {
+/// As [`sweep`], in the folders within, too. Links are not followed.
+///
+/// # Errors
+/// As [`sweep`].
+pub fn sweep_all(folder: &Path) -> Result<()> {
+    sweep(folder)?;
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            sweep_all(&entry.path())?;
+        }
+    }
+    Ok(())
+}
+
+/// Sweeps a folder if this process has not done so yet. What cannot be removed stays: nothing rests on it.
+fn sweep_once(folder: &Path) {
+    static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+    let is_new = SWEPT.lock().is_ok_and(|mut swept| swept.insert(folder.to_owned()));
+    if is_new {
+        let _ = sweep(folder);
+    }
+}
+
+/// The machine and the number of the process that made a temporary file, from the file's name.
+fn maker_of(name: &str) -> Option<(&str, i32)> {
     // SQLite keeps a journal beside a database while it is written.
     let name = name.strip_suffix("-journal").unwrap_or(name);
     let (_, numbers) = name.strip_suffix(ENDING)?.rsplit_once('.')?;
-    let (process, number) = numbers.strip_prefix(MACHINE.as_str())?.strip_prefix('-')?.split_once('-')?;
+    let (machine, numbers) = numbers.split_once('-')?;
+    let (process, number) = numbers.split_once('-')?;
     number.parse::<u64>().ok()?;
-    process.parse().ok()
+    let is_machine = machine.len() == MACHINE.len() && machine.bytes().all(|byte| byte.is_ascii_hexdigit());
+    is_machine.then_some((machine, process.parse().ok()?))
 }
 
 fn runs(process: i32) -> bool {
@@ -384,6 +524,9 @@ fn is_read(path: &Path) -> Result<Option<File>> {
 
 #[cfg(test)]
 mod tests {
+    use std::fs::Permissions;
+    use std::os::unix::fs::PermissionsExt;
+
     use super::*;
 
     #[test]
@@ -456,6 +599,64 @@ mod tests {
     }
 
     #[test]
+    fn a_file_that_is_written_again_keeps_what_it_was() {
+        let scratch = tempfile::tempdir().unwrap();
+        let at = |name: &str| scratch.path().join(name);
+        let set =
+            |name: &str, mode| std::fs::set_permissions(at(name), Permissions::from_mode(mode)).unwrap();
+        let mode = |name: &str| std::fs::metadata(at(name)).unwrap().permissions().mode() & 0o7777;
+        for (name, bits) in [("private", 0o600), ("run", 0o755), ("open", 0o666)] {
+            std::fs::write(at(name), "a longer text").unwrap();
+            set(name, bits);
+            write_named(&at(name), b"text").unwrap();
+            assert_eq!((mode(name), std::fs::read_to_string(at(name)).unwrap()), (bits, "text".to_owned()));
+        }
+        std::fs::hard_link(at("private"), at("further")).unwrap();
+        std::os::unix::fs::symlink("further", at("link")).unwrap();
+        write_named(&at("link"), b"new").unwrap();
+        assert_eq!(std::fs::read_to_string(at("private")).unwrap(), "new");
+        assert!(at("link").is_symlink() && mode("private") == 0o600);
+        set("private", 0o400);
+        assert!(write_named(&at("link"), b"other").unwrap_err().to_string().contains("read-only"));
+        assert_eq!(std::fs::read_to_string(at("further")).unwrap(), "new");
+        assert_eq!(std::fs::read_dir(scratch.path()).unwrap().count(), 5, "no partial file is left");
+    }
+
+    #[test]
+    fn files_are_compared_by_what_they_hold() {
+        let scratch = tempfile::tempdir().unwrap();
+        let at = |name: &str| scratch.path().join(name);
+        let long = vec![7; CHUNK * 2 + 3];
+        let other = [&long[1..], &[8]].concat();
+        for (name, bytes) in [("a", &long), ("b", &long), ("c", &other), ("d", &Vec::new())] {
+            std::fs::write(at(name), bytes).unwrap();
+        }
+        std::os::unix::fs::symlink("/dev/zero", at("zero")).unwrap();
+        let equal = |one: &str, other: &str| are_equal(&at(one), &at(other)).unwrap();
+        assert!(equal("a", "b") && equal("d", "d"));
+        assert!(!equal("a", "c") && !equal("a", "d") && !equal("zero", "zero") && !equal("a", "zero"));
+        assert!(are_equal(&at("a"), &at("e")).is_err());
+    }
+
+    #[test]
+    fn a_lock_is_had_once() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("mark");
+        let lock = Lock::of_file(&path).unwrap();
+        assert_eq!(Lock::of_file(&path).err().unwrap().kind(), ErrorKind::WouldBlock);
+        assert!(lock.is_at(&path));
+        std::fs::remove_file(&path).unwrap();
+        assert!(!lock.is_at(&path));
+        assert!(Lock::of_file(&path).unwrap().is_at(&path));
+        std::os::unix::fs::symlink("nowhere", scratch.path().join("link")).unwrap();
+        assert!(Lock::of_file(&scratch.path().join("link")).is_err());
+        let folder = Lock::of_folder(scratch.path()).unwrap();
+        assert!(Lock::of_folder(scratch.path()).is_err());
+        drop(folder);
+        assert!(Lock::of_folder(scratch.path()).is_ok());
+    }
+
+    #[test]
     fn what_the_dead_left_is_swept_away() {
         let scratch = tempfile::tempdir().unwrap();
         let own = format!("run.db.{}-{}-7.partial", *MACHINE, std::process::id());
@@ -471,6 +672,11 @@ mod tests {
         let kept: Vec<_> =
             std::fs::read_dir(scratch.path()).unwrap().flatten().map(|entry| entry.file_name()).collect();
         assert_eq!(kept.len(), 4, "{kept:?}");
+        assert!(is_temporary(&own) && is_temporary(&left[1]) && !is_temporary("notes.partial"));
+        std::fs::create_dir_all(scratch.path().join("a/b")).unwrap();
+        std::fs::write(scratch.path().join("a/b").join(&left[0]), "").unwrap();
+        sweep_all(scratch.path()).unwrap();
+        assert_eq!(std::fs::read_dir(scratch.path().join("a/b")).unwrap().count(), 0);
         assert!(is_partial(&own, "run.db") && is_partial("run.yaml.partial", "run.yaml"));
         assert!(!is_partial("run.yaml", "run.yaml") && !is_partial("other.partial", "run.yaml"));
     }

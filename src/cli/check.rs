@@ -1,8 +1,11 @@
 //! `avastra check`: every static check, and a look at the stages.
 
 use std::path::Path;
+use std::sync::Arc;
 
-use avastra_lang::check::Loaded;
+use avastra_base::outside::Shown;
+use avastra_lang::check::{KnownSpaces, Loaded};
+use avastra_lang::model::Space;
 use avastra_lang::syntax::ast::FileId;
 use avastra_lang::syntax::{Diagnostic, apply_fixes};
 use avastra_world::action::{ActionTable, audit};
@@ -20,8 +23,11 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
     let (mut errors, mut warnings) = (0, 0);
     let mut files = Vec::new();
     let (mut unread, mut failed) = (Vec::new(), Vec::new());
+    let (mut known, mut scenes) = (KnownSpaces::default(), Scenes::default());
+    // What was found of the space of the file before: most often it is that of this one, too.
+    let mut warned: Option<(Arc<Space>, Vec<Diagnostic>)> = None;
     for path in &arguments.files {
-        let mut loaded = match load::read_and_check(path) {
+        let mut loaded = match load::read_and_check_among(path, &mut known) {
             Ok(loaded) => loaded,
             Err(failure) => {
                 failed.push(serde_json::json!({ "file": path, "error": failure.to_string() }));
@@ -30,9 +36,20 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
             }
         };
         if arguments.fix && fix(output, path, &loaded)? {
-            loaded = load::read_and_check(path)?;
+            // Other files may use it.
+            known = KnownSpaces::default();
+            loaded = load::read_and_check_among(path, &mut known)?;
         }
-        places::warn(&mut loaded, &mut Scenes::default());
+        match (&warned, &loaded.space) {
+            (Some((of, found)), Some(space)) if Arc::ptr_eq(of, space) => {
+                loaded.diagnostics.extend(found.iter().cloned());
+            }
+            _ => {
+                let before = loaded.diagnostics.len();
+                places::warn(&mut loaded, &mut scenes);
+                warned = loaded.space.clone().map(|space| (space, loaded.diagnostics[before..].to_vec()));
+            }
+        }
         output.diagnostics(&loaded.sources, &loaded.diagnostics);
         output.diagnostics(&loaded.sources, &shown(output, std::mem::take(&mut loaded.remarks)));
         let wrong = loaded.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).count();
@@ -56,9 +73,9 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
             _ if dump.is_some() || wrong > 0 => {}
             Some(engine) => output.say(&format!(
                 "{}: made in world `{engine}`, this is `{ENGINE}`: it cannot be replayed here",
-                path.display()
+                path.shown()
             )),
-            None => output.tell(&format!("{}: no mistakes", path.display())),
+            None => output.tell(&format!("{}: no mistakes", path.shown())),
         }
         files.push(serde_json::json!({ "file": path, "errors": wrong, "dump": dump, "audit": audit }));
     }
@@ -98,7 +115,7 @@ fn fix(output: &Output, path: &Path, loaded: &Loaded) -> Result<bool, Failure> {
     let (text, made) = apply_fixes(root, loaded.sources.text(root), &loaded.diagnostics);
     if made > 0 {
         write_again(path, &text)?;
-        output.tell(&format!("{}: {} made", path.display(), plural(made, "change")));
+        output.tell(&format!("{}: {} made", path.shown(), plural(made, "change")));
     }
     Ok(made > 0)
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use avastra_base::outside::Shown;
 use avastra_campaign::run::road_named;
 use avastra_campaign::trial::{Cell, TrialSettings};
 use avastra_world::action::{ActionTable, TableFile};
@@ -28,8 +29,8 @@ pub fn compile(output: &Output, arguments: &CompileArguments) -> Result<(), Fail
     let text = table.yaml().map_err(|error| Failure::file("write", &path, error))?;
     folder(Path::new(""), FOLDER)?;
     write_result(arguments.output.as_ref(), &path, &text)?;
-    write(Path::new(LAST), &format!("{}\n", path.display()))?;
-    output.tell(&format!("{}: {} -> {}", arguments.file.display(), size(&table), path.display()));
+    write(Path::new(LAST), &format!("{}\n", path.shown()))?;
+    output.tell(&format!("{}: {} -> {}", arguments.file.shown(), size(&table), path.shown()));
     output.result(serde_json::json!({ "table": path, "rows": table.rows().len() }));
     Ok(())
 }
@@ -48,7 +49,7 @@ pub fn last(output: &Output) -> Result<ActionTable, Failure> {
     if table.file() != file {
         return Err(Failure::usage(format!(
             "`{}` is older than its sources: run `avastra compile {}` again",
-            path.display(),
+            path.shown(),
             file.space
         )));
     }

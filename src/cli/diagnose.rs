@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use avastra_base::outside::Shown;
 use avastra_base::statistics::Estimate;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::oracle::{
@@ -37,7 +38,7 @@ pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Fa
     match found.done.as_slice() {
         [only] if found.is_single() => tell_one(output, only),
         several => several.iter().for_each(|found| {
-            output.tell(&format!("{}: {}", found.file.display(), sentence(&found.diagnosis)));
+            output.tell(&format!("{}: {}", found.file.shown(), sentence(&found.diagnosis)));
         }),
     }
     let [causes, cures] = [Explained::cause, Explained::cure].map(|of| counted(&found.done, of));

@@ -5,6 +5,7 @@
 
 use serde_json::{Value, json};
 
+use avastra_base::outside::Shown;
 use avastra_base::units;
 use avastra_editor::words::{self, Entry};
 use avastra_lang::model::vocabulary::{Site, StopReason};
@@ -22,7 +23,7 @@ pub fn editor_files(output: &Output, arguments: &EditorFilesArguments) -> Result
         let path = arguments.directory.join(name);
         make_way(&arguments.directory, &path)?;
         write(&path, &text)?;
-        output.tell(&path.display().to_string());
+        output.tell(&path.shown().to_string());
         paths.push(path);
     }
     output.result(json!({ "files": paths }));

@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use avastra_base::outside::Shown;
 use avastra_campaign::run::Run;
 use avastra_lang::syntax::{DiagnosticRecord, Style, record, render};
 use avastra_world::action::ActionTable;
@@ -51,7 +52,7 @@ pub fn compile(path: &Path) -> Result<Compiled, Unusable> {
     let is_emitted = loaded.scenario.is_some() || loaded.policy.is_some();
     match loaded.space.take().filter(|space| !is_emitted && !space.actions.is_empty()) {
         Some(space) => Ok(Compiled { table: ActionTable::new(space), diagnostics }),
-        None => Err(Unusable::File(format!("`{}` is no space: it declares no action", path.display()))),
+        None => Err(Unusable::File(format!("`{}` is no space: it declares no action", path.shown()))),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use avastra_base::outside::Shown;
 use avastra_campaign::run::RunError;
 
 /// Every way in which a command can fail.
@@ -9,7 +10,7 @@ use avastra_campaign::run::RunError;
 pub enum Failure {
     #[error("{message}")]
     Usage { message: String },
-    #[error("cannot {doing} `{}`: {reason}", path.display())]
+    #[error("cannot {doing} `{}`: {reason}", path.shown())]
     File { doing: &'static str, path: PathBuf, reason: String },
     /// The diagnostics are on stderr already.
     #[error("{count} in the source", count = super::output::plural(*errors, "mistake"))]

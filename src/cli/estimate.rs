@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+use avastra_base::outside::Shown;
 use avastra_base::statistics::Interval;
 use avastra_campaign::estimate::{
     Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
@@ -97,7 +98,7 @@ fn play_all(
     let stop = stop_on_interrupt();
     directory.restore(output)?;
     let share = Share::of(&path, estimate.settings())?;
-    output.tell(&format!("{}, into {}", heading(&estimate), path.display()));
+    output.tell(&format!("{}, into {}", heading(&estimate), path.shown()));
     let jobs = jobs(asked_jobs, estimate.run().arena().program())?;
     let Some(pilot) = piloted(output, &estimate, &mut directory, jobs, &stop)? else {
         return share.end(output, directory, false, None);
@@ -406,7 +407,7 @@ fn compare(
     let numbers: Vec<usize> = (0..comparison.pairs()).collect();
     output.tell(&format!(
         "{}: {} and {} in the same {}",
-        file.display(),
+        file.shown(),
         sides[0],
         sides[1],
         plural(numbers.len(), "episode")
@@ -448,7 +449,7 @@ fn heading(estimate: &Estimate) -> String {
     };
     format!(
         "{}: how often {} under {} against {}{}, {method}, {} of {} on {}, seed {}",
-        estimate.run().space().path.display(),
+        estimate.run().space().path.shown(),
         settings.event.in_words(),
         settings.run.agent,
         estimate.run().arena().ads_name(),

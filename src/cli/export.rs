@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
+use avastra_base::outside::Shown;
 use avastra_campaign::run::recorded;
 use avastra_exchange::export::{self, ExportError, Recording, record};
 
@@ -60,13 +61,13 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
     for Exported { file, written, left_out, refused } in &exported.done {
         refused.iter().for_each(|step| output.warn(&format!("{}: {step}", file.display())));
         if !left_out.is_empty() {
-            output.aside(&format!("{}: left out: {}", file.display(), left_out.join("; ")));
+            output.aside(&format!("{}: left out: {}", file.shown(), left_out.join("; ")));
         }
         match written {
-            Ok(files) => output.tell(&format!("{}: {}", file.display(), files[0].display())),
+            Ok(files) => output.tell(&format!("{}: {}", file.shown(), files[0].shown())),
             Err(reason) => {
                 refuted += 1;
-                output.say(&format!("{}: {reason}", file.display()));
+                output.say(&format!("{}: {reason}", file.shown()));
             }
         }
     }
@@ -131,9 +132,9 @@ fn targets(arguments: &ExportArguments) -> Result<BTreeMap<PathBuf, PathBuf>, Fa
         if let Some(other) = sources.insert(target.clone(), file).filter(|other| other != file) {
             return Err(Failure::usage(format!(
                 "`{}` and `{}` would both be written to `{}`: export them to two folders",
-                other.display(),
-                file.display(),
-                target.display()
+                other.shown(),
+                file.shown(),
+                target.shown()
             )));
         }
         targets.insert(file.clone(), target);
@@ -208,7 +209,7 @@ pub fn map_name(map: &Path) -> Result<&str, Failure> {
     map.file_name().and_then(|name| name.to_str()).ok_or_else(|| {
         Failure::usage(format!(
             "no OpenSCENARIO file can name the map `{}`: give it a name in UTF-8",
-            map.display()
+            map.shown()
         ))
     })
 }

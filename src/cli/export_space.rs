@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use avastra_base::outside::Shown;
 use avastra_campaign::run::{Arena, driving_system};
 use avastra_exchange::export::{self, SpaceFiles};
 use avastra_lang::syntax::ast::{FileId, ItemKind};
@@ -46,7 +47,7 @@ pub fn export_spaces(output: &Output, arguments: &ExportArguments) -> Result<(),
         written += rows;
         output.say(&format!(
             "{}: {} of {} on their roads in {}",
-            file.display(),
+            file.shown(),
             rows,
             plural(rows + found.left_out.values().map(Vec::len).sum::<usize>(), "row"),
             plural(found.templates.len(), "template")
@@ -85,7 +86,7 @@ fn one(
         if let Some(other) =
             maps.insert(name.clone(), road.map_path.clone()).filter(|other| *other != road.map_path)
         {
-            let (other, own) = (other.display(), road.map_path.display());
+            let (other, own) = (other.shown(), road.map_path.shown());
             return Err(Failure::usage(format!(
                 "the maps `{other}` and `{own}` would both be written as `{name}`"
             )));

@@ -3,6 +3,7 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use avastra_base::outside::Shown;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::files;
 use avastra_drivers::external;
@@ -19,7 +20,7 @@ pub fn must_end_in(path: &Path, extension: &str) -> Result<(), Failure> {
     }
     Err(Failure::usage(format!(
         "`{}` must end in `.{extension}`: choose such a name for what is written",
-        path.display()
+        path.shown()
     )))
 }
 
@@ -148,8 +149,8 @@ pub fn copy_map(map: &Path, target: &Path) -> Result<(), Failure> {
     }
     let other = match load::read(target) {
         Ok(there) if there == text => return Ok(()),
-        Ok(_) => format!("another map is already at `{}`", target.display()),
-        Err(reason) => format!("`{}` is in the place of the map: {reason}", target.display()),
+        Ok(_) => format!("another map is already at `{}`", target.shown()),
+        Err(reason) => format!("`{}` is in the place of the map: {reason}", target.shown()),
     };
     Err(Failure::usage(format!("{other}: name another folder with `--out`")))
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use avastra_base::outside::Shown;
 use avastra_lang::syntax::{FormatError, Sources};
 
 use super::arguments::FmtArguments;
@@ -17,8 +18,7 @@ pub fn fmt(output: &Output, arguments: &FmtArguments) -> Result<(), Failure> {
     for path in &arguments.files {
         let from_stdin = path == Path::new("-");
         let text = match from_stdin {
-            true => std::io::read_to_string(std::io::stdin())
-                .map_err(|error| Failure::file("read", Path::new("stdin"), error))?,
+            true => load::stdin()?,
             false => load::text(path)?,
         };
         let formatted = formatted(output, path, &text)?;
@@ -26,14 +26,14 @@ pub fn fmt(output: &Output, arguments: &FmtArguments) -> Result<(), Failure> {
         if arguments.check {
             if !is_formatted {
                 unformatted += 1;
-                output.say(&format!("{}: not formatted", path.display()));
+                output.say(&format!("{}: not formatted", path.shown()));
             }
         } else if from_stdin {
             output.document(formatted.trim_end_matches('\n'));
             texts.push(formatted);
         } else if !is_formatted {
             write_again(path, &formatted)?;
-            output.tell(&format!("{}: formatted", path.display()));
+            output.tell(&format!("{}: formatted", path.shown()));
         }
     }
     output.result(serde_json::json!({ "unformatted": unformatted, "texts": texts }));
@@ -42,7 +42,7 @@ pub fn fmt(output: &Output, arguments: &FmtArguments) -> Result<(), Failure> {
 
 fn formatted(output: &Output, path: &Path, text: &str) -> Result<String, Failure> {
     let mut sources = Sources::new();
-    let file = sources.add(path.display().to_string(), text);
+    let file = sources.add(path.to_string_lossy(), text);
     avastra_lang::syntax::format(file, text).map_err(|error| match error {
         FormatError::Syntax(diagnostics) => {
             output.diagnostics(&sources, &diagnostics);

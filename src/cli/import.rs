@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use avastra_base::outside::{Shown, in_line};
 use avastra_campaign::episode::{End, Outcome};
 use avastra_campaign::files::PlainName;
 use avastra_campaign::run::{Stage, recorded};
@@ -41,10 +42,10 @@ pub fn import(output: &Output, arguments: &ImportArguments) -> Result<(), Failur
             Ok(taken) => {
                 let (space, scenario) = (&taken.space, &taken.scenario);
                 let paths: Vec<String> =
-                    space.iter().chain(scenario).map(|path| path.display().to_string()).collect();
-                output.say(&format!("{}: {}", file.display(), paths.join(", ")));
+                    space.iter().chain(scenario).map(|path| path.shown().to_string()).collect();
+                output.say(&format!("{}: {}", file.shown(), paths.join(", ")));
                 for note in &taken.notes {
-                    output.tell(&format!("  {note}"));
+                    output.tell(&format!("  {}", in_line(note)));
                 }
                 results.push(serde_json::json!({
                     "file": file, "space": space, "scenario": scenario, "notes": taken.notes, "refused": [],
@@ -57,7 +58,8 @@ pub fn import(output: &Output, arguments: &ImportArguments) -> Result<(), Failur
                         Some(scenario) => folder_of(file).join(slashed(scenario)),
                         None => file.clone(),
                     };
-                    output.say(&format!("{}:{line}: {element}: {reason}", place.display()));
+                    let (element, reason) = (in_line(element), in_line(reason));
+                    output.say(&format!("{}:{line}: {element}: {reason}", place.shown()));
                 }
                 results.push(serde_json::json!({
                     "file": file, "space": null, "scenario": null, "notes": [], "refused": refusals,
@@ -118,7 +120,7 @@ fn one(
         let name = source.file_name().unwrap_or_default().to_string_lossy();
         let name = PlainName::new(name).map_err(|error| Failure::file("import", file, error))?;
         if let Some(other) = maps.insert(target.with_file_name(&*name), source.clone()) {
-            let (other, source) = (other.display(), source.display());
+            let (other, source) = (other.shown(), source.shown());
             return Ok(Err(refused(format!("two maps have one name: `{other}` and `{source}`"))));
         }
     }
@@ -139,7 +141,7 @@ fn one(
     if let Some((path, _)) = texts.iter().find(is_other) {
         let message = format!(
             "`{}` is there already, and says something else: name another folder with `--out`",
-            path.display()
+            path.shown()
         );
         return Err(Failure::usage(message));
     }
@@ -231,7 +233,7 @@ fn targets(arguments: &ImportArguments) -> Result<Vec<PathBuf>, Failure> {
         let target = target(file, arguments.out.as_ref(), FOLDER, "ava")?;
         if targets.contains(&target) {
             let message =
-                format!("two files would be written to `{}`: import them to two folders", target.display());
+                format!("two files would be written to `{}`: import them to two folders", target.shown());
             return Err(Failure::usage(message));
         }
         targets.push(target);

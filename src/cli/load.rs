@@ -7,10 +7,11 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
+use avastra_base::outside::Shown;
 use avastra_campaign::run::{self, Asked, Profile, RunError, driving_system};
 use avastra_drivers::external::{Attached, ExternalSettings, Target};
 use avastra_drivers::{EXTERNAL, ModularConfig, REGISTRY};
-use avastra_lang::check::{self, Loaded, ReadError};
+use avastra_lang::check::{self, KnownSpaces, Loaded, ReadError};
 use avastra_lang::model::{Policy, Scenario, Space};
 use avastra_lang::syntax::{nearest, yaml_mistake};
 use avastra_world::action::ActionTable;
@@ -70,6 +71,13 @@ pub fn read_and_check(path: &Path) -> Result<Loaded, Failure> {
     check_read(path, &|other| if other == own { read(other) } else { read_used(other) })
 }
 
+/// Does the same for one of many files: the spaces that they use are read once.
+pub fn read_and_check_among(path: &Path, known: &mut KnownSpaces) -> Result<Loaded, Failure> {
+    let own = check::normal(path);
+    let read = |other: &Path| if other == own { read(other) } else { read_used(other) };
+    judged(path, check::load_among(path, &read, known))
+}
+
 /// Does the same for a file that has another text than the one on the disk.
 ///
 /// # Errors
@@ -80,10 +88,15 @@ pub fn check_text(path: &Path, text: &str) -> Result<Loaded, Failure> {
 }
 
 fn check_read(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, Failure> {
-    if path.is_dir() {
-        return Err(Failure::file("read", path, name_a_file_in(path)));
-    }
-    let mut loaded = check::load(path, read).map_err(|error| Failure::file("read", path, error))?;
+    judged(path, check::load(path, read))
+}
+
+fn judged(path: &Path, loaded: Result<Loaded, ReadError>) -> Result<Loaded, Failure> {
+    let failed = |error| match path.is_dir() {
+        true => Failure::file("read", path, name_a_file_in(path)),
+        false => Failure::file("read", path, error),
+    };
+    let mut loaded = loaded.map_err(failed)?;
     places::judge_claims(&mut loaded, &mut Scenes::default());
     if loaded.diagnostics.iter().any(avastra_lang::syntax::Diagnostic::is_error) {
         check::suggest_uses(&mut loaded, &nearby(path));
@@ -95,7 +108,7 @@ fn check_read(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, Failure
 fn name_a_file_in(folder: &Path) -> String {
     let within = ["critical", "failures", ""].map(|name| folder.join(name));
     match within.iter().find(|folder| sources_in(folder).is_ok_and(|files| !files.is_empty())) {
-        Some(folder) => format!("it is a folder: name files in it, as `{}`", folder.join("*.ava").display()),
+        Some(folder) => format!("it is a folder: name files in it, as `{}`", folder.join("*.ava").shown()),
         None => FOLDER.to_owned(),
     }
 }
@@ -203,11 +216,11 @@ pub fn everything_in(directory: &Path) -> Result<BTreeMap<PathBuf, PathBuf>, Fai
 pub fn table(output: &Output, path: &Path) -> Result<ActionTable, Failure> {
     let loaded = load(output, path)?;
     if loaded.scenario.is_some() {
-        let (path, word) = (path.display(), for_shell(path));
+        let (path, word) = (path.shown(), for_shell(path));
         return Err(Failure::usage(format!("`{path}` is a scenario: `avastra replay {word}` plays it")));
     }
     if loaded.policy.is_some() {
-        let (path, word) = (path.display(), for_shell(path));
+        let (path, word) = (path.shown(), for_shell(path));
         return Err(Failure::usage(format!("`{path}` is a policy: `avastra run --policy {word}` plays it")));
     }
     Ok(ActionTable::new(space(loaded, path)?))
@@ -225,7 +238,7 @@ pub fn scenario(output: &Output, path: &Path) -> Result<(ActionTable, Scenario),
 pub fn scenario_in(output: &Output, path: &Path, loaded: Loaded) -> Result<(ActionTable, Scenario), Failure> {
     let mut loaded = sound(output, loaded)?;
     let Some(scenario) = loaded.scenario.take() else {
-        let (path, word) = (path.display(), for_shell(path));
+        let (path, word) = (path.shown(), for_shell(path));
         let hint = match (&loaded.policy, &loaded.space) {
             (Some(_), _) => format!(": it is a policy, and `avastra run --policy {word}` plays it"),
             (None, Some(space)) if !space.actions.is_empty() => {
@@ -360,7 +373,7 @@ pub fn external(config: Option<&Path>, command: Option<&str>) -> Result<Option<E
         (Some(settings), Some(command)) => Ok(Some(ExternalSettings { command, ..settings })),
         (None, Some(_)) => Err(Failure::usage(format!(
             "`{}` is a profile of `modular`: with a command it must have an `ads` block",
-            path.display()
+            path.shown()
         ))),
         (settings, None) => Ok(settings),
     }
@@ -410,7 +423,7 @@ pub fn emitted_in(path: &Path, mut loaded: Loaded) -> Result<Emitted, Failure> {
         let scenario = with_answers(scenario, path)?;
         return Ok(Emitted::Scenario(ActionTable::new(space(loaded, path)?), Box::new(scenario)));
     }
-    Err(Failure::usage(format!("`{}` has neither a scenario nor a policy", path.display())))
+    Err(Failure::usage(format!("`{}` has neither a scenario nor a policy", path.shown())))
 }
 
 /// A policy file: its space's table and its policy.
@@ -425,7 +438,7 @@ pub fn policy(output: &Output, path: &Path) -> Result<(ActionTable, Policy), Fai
 pub fn policy_in(output: &Output, path: &Path, loaded: Loaded) -> Result<(ActionTable, Policy), Failure> {
     match emitted_in(path, sound(output, loaded)?)? {
         Emitted::Policy(table, policy) => Ok((table, *policy)),
-        Emitted::Scenario(..) => Err(Failure::usage(format!("`{}` is no policy", path.display()))),
+        Emitted::Scenario(..) => Err(Failure::usage(format!("`{}` is no policy", path.shown()))),
     }
 }
 
@@ -436,7 +449,7 @@ pub fn is_policy(loaded: &Loaded) -> bool {
 
 fn space(loaded: Loaded, path: &Path) -> Result<Arc<Space>, Failure> {
     let space = loaded.space.filter(|space| !space.actions.is_empty());
-    space.ok_or_else(|| Failure::usage(format!("`{}` declares no action", path.display())))
+    space.ok_or_else(|| Failure::usage(format!("`{}` declares no action", path.shown())))
 }
 
 /// What a text in YAML says; `path` is its file.
@@ -505,9 +518,19 @@ fn read_up_to(path: &Path, bytes_max: u64) -> Result<String, ReadError> {
     if !metadata.is_file() {
         return Err(ReadError("it is no regular file".to_owned()));
     }
+    text_of(File::open(path).map_err(unread)?, bytes_max)
+}
+
+/// The text on standard input, which is a source.
+pub fn stdin() -> Result<String, Failure> {
+    let text = text_of(std::io::stdin().lock(), SOURCE_BYTES_MAX);
+    text.map_err(|error| Failure::file("read", Path::new("stdin"), error))
+}
+
+/// A text of a limited size. A file may grow while it is read, and a device has no end.
+fn text_of(from: impl Read, bytes_max: u64) -> Result<String, ReadError> {
     let mut bytes = Vec::new();
-    // The file may grow while it is read.
-    File::open(path).and_then(|file| file.take(bytes_max + 1).read_to_end(&mut bytes)).map_err(unread)?;
+    from.take(bytes_max + 1).read_to_end(&mut bytes).map_err(|error| ReadError(reason(&error)))?;
     if bytes.len() as u64 > bytes_max {
         return Err(ReadError(format!("it is larger than {} MiB", bytes_max >> 20)));
     }

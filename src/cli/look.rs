@@ -7,6 +7,7 @@
 
 use std::path::{Path, PathBuf};
 
+use avastra_base::outside::Shown;
 use avastra_campaign::run::{self, RunError};
 use avastra_lang::check::{Loaded, normal};
 use avastra_lang::model::{Scenario, code};
@@ -44,7 +45,7 @@ impl Changed {
     pub fn banner(&self, is_same: Option<bool>) -> String {
         let shown = match (&self.copy, is_same) {
             (Some(copy), None | Some(true)) => {
-                format!("shown as it was recorded, in the copy of its space at `{}`", copy.display())
+                format!("shown as it was recorded, in the copy of its space at `{}`", copy.shown())
             }
             (None, Some(true)) => "it still plays as it was recorded, to the bit".to_owned(),
             (_, Some(false)) => "what is shown is what plays now, not what was recorded".to_owned(),
@@ -137,7 +138,7 @@ fn in_copy(path: &Path, loaded: &Loaded) -> Option<String> {
     Some(format!(
         "its space is kept as it was at `{}`: write `use \"{written}\"` with the same digest, and it is played there. \
          {BRING_ALONG}",
-        copy.display()
+        copy.shown()
     ))
 }
 

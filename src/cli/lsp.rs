@@ -15,6 +15,7 @@ use std::sync::mpsc::{self, Receiver};
 
 use serde_json::{Map, Value, json};
 
+use avastra_base::outside::Shown;
 use avastra_editor::complete::{Proposal, ProposalKind};
 use avastra_editor::diagnostics::{Change, Changes, Mistake, Remedy};
 use avastra_editor::highlight::Token;
@@ -58,7 +59,7 @@ type Incoming = Result<Vec<u8>, TransportError>;
 pub fn serve() -> Result<(), Failure> {
     let (sender, receiver) = mpsc::channel();
     // The thread ends with the process, because a read from stdin cannot be interrupted.
-    std::thread::spawn(move || {
+    let reader = move || {
         let mut input = BufReader::new(std::io::stdin());
         while let Some(message) = transport::read(&mut input).transpose() {
             let is_last = message.is_err();
@@ -66,7 +67,9 @@ pub fn serve() -> Result<(), Failure> {
                 break;
             }
         }
-    });
+    };
+    let begun = std::thread::Builder::new().spawn(reader);
+    begun.map_err(|error| Failure::usage(format!("the system gives no thread to read with: {error}")))?;
     let mut server = Server::new();
     let mut waiting: VecDeque<Value> = VecDeque::new();
     loop {
@@ -468,12 +471,12 @@ impl Server {
     }
 
     fn analysis(&mut self, path: &Path) -> Result<&Analysis, Refusal> {
-        self.workspace.analysis(path).ok_or_else(|| Refusal::NotOpen(path.display().to_string()))
+        self.workspace.analysis(path).ok_or_else(|| Refusal::NotOpen(path.shown().to_string()))
     }
 
     /// The analysis of a document that [`Server::place`] has brought up to date.
     fn known(&self, path: &Path) -> Result<&Analysis, Refusal> {
-        self.workspace.known(path).ok_or_else(|| Refusal::NotOpen(path.display().to_string()))
+        self.workspace.known(path).ok_or_else(|| Refusal::NotOpen(path.shown().to_string()))
     }
 
     /// The document and the byte that a request is about.

@@ -10,13 +10,17 @@
 //! means the same serves.
 //!
 //! Until it is whole, the directory has the name `OUT.partial`. It gets its own name only if its space still means what it
-//! meant; then it is ended. A merge that was killed in between is ended by the next one.
+//! meant; then it is ended. A merge that was killed in between is ended by the next one. Two merges into one directory are kept
+//! apart by a lock on the mark in it.
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
+use std::fs::DirEntry;
+use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
 
-use avastra_campaign::files::{self, PlainName};
+use avastra_base::outside::Shown;
+use avastra_campaign::files::{self, Lock, PlainName};
 use avastra_campaign::run::{
     DatabaseError, Numbered, PolicyReference, Shard, Units, WrittenScenario, settings_differences,
 };
@@ -31,7 +35,7 @@ use super::files::{folder, make, remove, write};
 use super::output::{Output, plural};
 use super::{load, pack, run_directory, shard, timing};
 
-/// Tells a directory that a killed merge left from one of somebody else's.
+/// Tells a directory of a merge from one of somebody else's. The merge has it locked.
 const MARK: &str = "merge.partial";
 
 /// Brings shards together, or says which are missing.
@@ -40,7 +44,7 @@ pub fn merge(output: &Output, arguments: &MergeArguments) -> Result<(), Failure>
     for path in &arguments.directories {
         // A shard that was killed at once is as good as one that was never played.
         match path.is_dir() && run_directory::is_unbegun(path).unwrap_or(false) {
-            true => output.aside(&format!("{}: nothing was begun there", path.display())),
+            true => output.aside(&format!("{}: nothing was begun there", path.shown())),
             false => directories.push(path.clone()),
         }
     }
@@ -52,9 +56,9 @@ pub fn merge(output: &Output, arguments: &MergeArguments) -> Result<(), Failure>
         Some(Kind { merge: Some(merge), .. }) => merge(output, &directories, out),
         Some(Kind { what, .. }) => Err(Failure::usage(format!(
             "`{}` holds a {what}, which is one piece: each episode is chosen with what was learned before",
-            first.display()
+            first.shown()
         ))),
-        None => Err(Failure::usage(format!("`{}` holds no run, study or estimate", first.display()))),
+        None => Err(Failure::usage(format!("`{}` holds no run, study or estimate", first.shown()))),
     }
 }
 
@@ -97,7 +101,7 @@ impl<C: Cut> Played<C> {
     fn read(path: &Path, to: &Path, outside: &Outside) -> Result<Played<C>, Failure> {
         let what = C::KIND.what;
         if run_directory::what_was_begun(path).is_none_or(|found| found.what != what) {
-            let path = path.display();
+            let path = path.shown();
             return Err(Failure::usage(format!("`{path}` holds no {what}, which the first directory does")));
         }
         let (settings, begun) = run_directory::settings_of::<C>(path)?;
@@ -145,19 +149,20 @@ pub fn merged<C: Cut>(output: &Output, directories: &[PathBuf], out: Option<&Pat
         output.result(serde_json::json!({ "directory": null, "shards": shards, "missing": missing }));
         return Ok(());
     };
-    let partial = begin_partial(out)?;
+    let (partial, lock) = begin_partial(out)?;
     let brought = Survey::of::<C>(directories, (&partial, &outside), None).and_then(|survey| {
         survey.complete()?;
         bring_together::<C>(output, directories, (&partial, &outside), &survey.settings)?;
         publish::<C>(output, out, (&partial, &outside), &survey.settings)?;
         Ok(survey.shards)
     });
-    if brought.is_err() && partial.exists() {
+    // Once the directory has its name, another merge may have begun one of the old name.
+    if brought.is_err() && lock.is_at(&partial.join(MARK)) {
         discard(&partial)?;
     }
     let shards = brought?;
     // Not how many directories were named: one shard may have been named twice, or copied.
-    output.tell(&format!("{}: {} brought together", out.display(), plural(shards as usize, "shard")));
+    output.tell(&format!("{}: {} brought together", out.shown(), plural(shards as usize, "shard")));
     C::conclude(output, out)?;
     output.result(serde_json::json!({ "directory": out, "shards": shards, "missing": [] }));
     Ok(())
@@ -197,7 +202,7 @@ impl Survey {
             let text = played.text();
             let (first, _) = wanted.get_or_insert_with(|| (text.clone(), played.settings.work()));
             if let Some(what) = settings_differences(first, &text) {
-                let (path, first) = (path.display(), directories[0].display());
+                let (path, first) = (path.shown(), directories[0].shown());
                 return Err(Failure::usage(format!(
                     "`{path}` is no shard of the {} in `{first}`, where {what}",
                     C::KIND.what
@@ -207,7 +212,7 @@ impl Survey {
             if !played.shard.is_whole() {
                 let (known, known_path) = cut.get_or_insert((played.shard, path));
                 if known.count() != played.shard.count() {
-                    let (path, shard, known_path) = (path.display(), played.shard, known_path.display());
+                    let (path, shard, known_path) = (path.shown(), played.shard, known_path.shown());
                     return Err(Failure::usage(format!(
                         "`{path}` is shard {shard}, `{known_path}` is shard {known}: play all with one number of shards"
                     )));
@@ -242,40 +247,65 @@ impl Survey {
     }
 }
 
-/// Makes an empty directory beside the merged one, in place of what a killed merge left.
-fn begin_partial(out: &Path) -> Result<PathBuf, Failure> {
+/// Makes an empty directory beside the merged one, in place of what a killed merge left, and takes it for this process.
+fn begin_partial(out: &Path) -> Result<(PathBuf, Lock), Failure> {
     let mut name = out.file_name().ok_or_else(|| Failure::usage("`--out` needs a name"))?.to_owned();
     name.push(".partial");
     let beside = out.parent().unwrap_or(Path::new(""));
     make(beside)?;
-    let partial = folder(beside, &name)?;
-    if partial.join(MARK).is_file() {
-        discard(&partial)?;
-        folder(beside, &name)?;
+    loop {
+        let partial = folder(beside, &name)?;
+        let mark = partial.join(MARK);
+        if !besides_mark(&partial)?.is_empty() && !mark.is_file() {
+            return Err(Failure::usage(format!(
+                "`{}` is in the way: a merge is written there before it has its name",
+                partial.shown()
+            )));
+        }
+        match Lock::of_file(&mark) {
+            Ok(lock) if lock.is_at(&mark) => {
+                clear(&partial)?;
+                return Ok((partial, lock));
+            }
+            // A merge that ended at this moment has removed it.
+            Ok(_) => {}
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) if error.kind() == ErrorKind::WouldBlock => {
+                return Err(Failure::usage(format!(
+                    "another merge is at work in `{}`: wait for it, or name another directory",
+                    partial.shown()
+                )));
+            }
+            Err(error) => return Err(Failure::file("write", &mark, error)),
+        }
     }
-    let unread = |error| Failure::file("read", &partial, error);
-    if std::fs::read_dir(&partial).map_err(unread)?.next().is_some() {
-        return Err(Failure::usage(format!(
-            "`{}` is in the way: a merge is written there before it has its name",
-            partial.display()
-        )));
+}
+
+/// What is in the directory of a merge besides its mark.
+fn besides_mark(partial: &Path) -> Result<Vec<DirEntry>, Failure> {
+    let entries = std::fs::read_dir(partial).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
+    let mut entries = entries.map_err(|error| Failure::file("read", partial, error))?;
+    entries.retain(|entry| entry.file_name() != MARK);
+    Ok(entries)
+}
+
+/// Removes what is in the directory of a merge, but for its mark.
+fn clear(partial: &Path) -> Result<(), Failure> {
+    let failed = |error| Failure::file("remove", partial, error);
+    for entry in besides_mark(partial)? {
+        let (path, is_folder) = (entry.path(), entry.file_type().map_err(failed)?.is_dir());
+        if is_folder { files::remove_all(&path) } else { files::remove(&path) }.map_err(failed)?;
     }
-    write(&partial.join(MARK), "")?;
-    Ok(partial)
+    Ok(())
 }
 
 /// Removes an unfinished merge; its mark goes last.
 fn discard(partial: &Path) -> Result<(), Failure> {
-    let failed = |error| Failure::file("remove", partial, error);
-    for entry in std::fs::read_dir(partial).map_err(failed)? {
-        let entry = entry.map_err(failed)?;
-        if entry.file_name() == MARK {
-            continue;
-        }
-        let (path, is_folder) = (entry.path(), entry.file_type().map_err(failed)?.is_dir());
-        if is_folder { files::remove_all(&path) } else { files::remove(&path) }.map_err(failed)?;
-    }
-    files::remove_all(partial).map_err(failed)
+    clear(partial)?;
+    remove(&partial.join(MARK))?;
+    // Another merge may have begun in it at this moment.
+    let _ = files::remove_empty(partial);
+    Ok(())
 }
 
 /// Writes settings, database and scenarios.
@@ -332,15 +362,15 @@ fn publish<C: Cut>(
         merged.remove(Path::new(name));
     }
     let is_equal = |(name, path): (&PathBuf, &PathBuf)| -> Result<bool, Failure> {
-        let read = |path| std::fs::read(path).map_err(|error| Failure::file("read", path, error));
-        known.get(name).map_or(Ok(false), |known| Ok(read(known)? == read(path)?))
+        let Some(known) = known.get(name) else { return Ok(false) };
+        files::are_equal(known, path).map_err(|error| Failure::file("read", known, error))
     };
     // Further files, a page for example, do not make it another directory.
     let equal: Vec<bool> = merged.iter().map(is_equal).collect::<Result<_, _>>()?;
     discard(partial)?;
     match equal.contains(&false) {
         false => remove(&out.join(MARK)),
-        true => Err(Failure::usage(format!("`{}` is not empty: name a new directory", out.display()))),
+        true => Err(Failure::usage(format!("`{}` is not empty: name a new directory", out.shown()))),
     }
 }
 
@@ -471,7 +501,7 @@ impl Way<'_> {
         let copied = |found: WrittenScenario| {
             let file = (from.join(&found.name), found.text.clone());
             if run_directory::is_edited(&file) {
-                let path = file.0.display();
+                let path = file.0.shown();
                 output.warn(&format!("{path} was edited since it was written: what was written is taken"));
             }
             let text = copy_scenario(&found.name, &found.text, &critical)?;
@@ -564,6 +594,8 @@ fn copy_folder(name: &OsStr, [from, to]: [&Path; 2]) -> Result<(), Failure> {
         let name = entry.file_name();
         match entry.file_type().map_err(failed)?.is_dir() {
             true => copy_folder(&name, [&from, &to])?,
+            // A kill left it, or its maker is still at work.
+            false if name.to_str().is_some_and(files::is_temporary) => {}
             false => copy_text(&to.join(&name), &own_text(&entry.path())?)?,
         }
     }

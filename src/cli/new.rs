@@ -5,6 +5,7 @@ use std::path::Path;
 
 use clap::builder::PossibleValuesParser;
 
+use avastra_base::outside::{Shown, in_comment};
 use avastra_campaign::emit;
 use avastra_road::{RoadMap, propose};
 
@@ -105,18 +106,18 @@ pub fn new(output: &Output, arguments: &NewArguments) -> Result<(), Failure> {
     };
     let paths: Vec<_> = files.iter().map(|(name, text)| (arguments.directory.join(name), text)).collect();
     if let Some((path, _)) = paths.iter().find(|(path, _)| path.exists() || path.is_symlink()) {
-        return Err(Failure::usage(format!("`{}` exists: name another directory", path.display())));
+        return Err(Failure::usage(format!("`{}` exists: name another directory", path.shown())));
     }
     for (path, text) in &paths {
         make_way(&arguments.directory, path)?;
         write_new(path, text)?;
-        output.tell(&path.display().to_string());
+        output.tell(&path.shown().to_string());
     }
     let space = for_shell(&paths[0].0);
     let is_protocol = arguments.template.as_ref().is_some_and(|name| is_of_catalogue(name));
     let how = if is_protocol { "--agent every-row" } else { "--episodes 20" };
     output.tell(&format!("next: avastra check {space}, then avastra run {space} {how}"));
-    let files: Vec<String> = paths.iter().map(|(path, _)| path.display().to_string()).collect();
+    let files: Vec<String> = paths.iter().map(|(path, _)| path.shown().to_string()).collect();
     output.result(serde_json::json!({ "files": files }));
     Ok(())
 }
@@ -160,8 +161,7 @@ fn on_map(output: &Output, path: &Path) -> Result<Vec<(String, String)>, Failure
             name = format!("{name}_{}", names.len() + 1);
         }
         let (start, goal) = (emit::lane_point(&map, proposal.start), emit::lane_point(&map, proposal.goal));
-        // A junction's name may hold line breaks.
-        let reason = proposal.reason.split_whitespace().collect::<Vec<_>>().join(" ");
+        let reason = in_comment(&proposal.reason);
         let reason = format!("{}{}", reason[..1].to_uppercase(), &reason[1..]);
         roads += &format!(
             "\n/// {reason}.\nroad {name} {{\n  map: \"{file}\"\n  start: {start}\n  goal: {goal}\n}}\n"

@@ -5,7 +5,8 @@ use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::Mutex;
 
-use avastra_lang::syntax::{Diagnostic, DiagnosticRecord, Sources, Style, visible};
+use avastra_base::outside::{Shown, json_on_terminal, on_terminal};
+use avastra_lang::syntax::{Diagnostic, DiagnosticRecord, Sources, Style};
 
 use super::arguments::{Format, OutputArguments, When};
 use super::error::Failure;
@@ -113,12 +114,14 @@ impl Output {
             let (status, error) = (failure.map_or(0, Failure::status), failure.map(Failure::to_string));
             let result = std::mem::take(&mut *self.result.lock().expect("nothing panics while it holds it"));
             let line = Line { schema: SCHEMA, command, status, error, result };
-            self.print(&serde_json::to_string(&line).expect("results have string keys only"));
+            let json = serde_json::to_string(&line).expect("results have string keys only");
+            self.print(&json_on_terminal(&json));
             return;
         }
         if self.format == Format::Sarif {
             let log = sarif::log(&self.collected());
-            self.print(&serde_json::to_string_pretty(&log).expect("it is JSON already"));
+            let json = serde_json::to_string_pretty(&log).expect("it is JSON already");
+            self.print(&json_on_terminal(&json));
         }
         failure.iter().for_each(|failure| self.fault(failure));
     }
@@ -135,7 +138,13 @@ impl Output {
 
     /// A text after a word in a colour, on stderr.
     fn head(&self, word: &str, colour: &str, text: &str) {
-        let text = visible(text);
+        // A text from a file may hold line breaks. No line but ours begins without a blank.
+        let lines: Vec<&str> = text.split('\n').collect();
+        let (first, more) = lines.split_first().expect("there is always a line");
+        let indent =
+            |line: &&str| if line.starts_with(' ') { format!("\n{line}") } else { format!("\n  {line}") };
+        let text = first.to_string() + &more.iter().map(indent).collect::<String>();
+        let text = on_terminal(&text);
         match (self.is_for_no_person(), self.colour) {
             (true, _) => {}
             (false, true) => drawn(&format!("\x1b[1;{colour}m{word}\x1b[0m: {text}")),
@@ -176,7 +185,7 @@ impl Output {
 
     /// Text for people on stdout; nothing in JSON.
     pub fn say(&self, text: &str) {
-        self.document(&visible(text));
+        self.document(&on_terminal(text));
     }
 
     /// A text that a program may read, as it is: a source, a picture or JSON; nothing in JSON, whose result has it.
@@ -211,7 +220,8 @@ impl Output {
                 Format::Sarif => self.collected().push(avastra_lang::syntax::record(diagnostic, sources)),
                 Format::Json => {
                     let record = avastra_lang::syntax::record(diagnostic, sources);
-                    drawn(&serde_json::to_string(&record).expect("records have string keys only"));
+                    let json = serde_json::to_string(&record).expect("records have string keys only");
+                    drawn(&json_on_terminal(&json));
                 }
                 Format::Human | Format::Plain => {
                     let style = if self.colour { Style::Human } else { Style::Plain };
@@ -261,7 +271,7 @@ pub fn unless_closed(error: std::io::Error) -> std::io::Result<()> {
 
 /// A line on stderr.
 pub fn remark(text: &str) {
-    drawn(&visible(text));
+    drawn(&on_terminal(text));
 }
 
 /// A line on stderr whose colours, if any, are ours. If it is lost, there is no place left to say so; the exit status says
@@ -299,7 +309,7 @@ pub fn folded(text: &str, width: usize) -> Vec<String> {
 
 /// A path as a shell takes it for one word, for commands that are printed to be copied.
 pub fn for_shell(path: &Path) -> String {
-    let text = path.display().to_string();
+    let text = path.shown().to_string();
     let is_plain = |letter: char| letter.is_alphanumeric() || "/._-+,:@%=".contains(letter);
     if !text.is_empty() && text.chars().all(is_plain) {
         return text;

@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
+use avastra_base::outside::Shown;
 use avastra_campaign::files;
 use avastra_lang::check::{Loaded, LoadedFile, WrittenPath, normal};
 use avastra_lang::syntax::ast::{Expr, ExprKind, FileId};
@@ -41,7 +42,7 @@ pub fn pack(output: &Output, files: &[PathBuf], folder: &Path) -> Result<(), Fai
         }
     }
     plan.carry_out(folder, &|| packed.iter().try_for_each(|target| load::load(output, target).map(drop)))?;
-    output.say(&format!("{}: {} with all that they use", folder.display(), plural(packed.len(), "file")));
+    output.say(&format!("{}: {} with all that they use", folder.shown(), plural(packed.len(), "file")));
     output.result(serde_json::json!({ "files": packed, "left_out": [], "refuted": 0, "failed": [] }));
     Ok(())
 }
@@ -97,15 +98,14 @@ impl Plan {
                 }
                 None => load::text(from)?,
             };
-            let is_equal = match (self.texts.get(to), std::fs::read(to)) {
-                (Some(known), _) => *known == text,
-                (None, Ok(known)) => known == text.as_bytes(),
-                (None, Err(_)) => true,
+            let is_equal = match self.texts.get(to) {
+                Some(known) => *known == text,
+                None => !to.exists() || load::read(to).is_ok_and(|known| known == text),
             };
             if !is_equal {
                 return Err(Failure::usage(format!(
                     "`{}` is already there, with another content: name another folder",
-                    to.display()
+                    to.shown()
                 )));
             }
             self.texts.insert(to.clone(), text);

@@ -5,6 +5,7 @@ use std::convert::Infallible;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use avastra_base::outside::Shown;
 use avastra_campaign::run::{RunError, on_threads};
 use avastra_drivers::external::Program;
 
@@ -99,7 +100,7 @@ pub fn each_file_in_turn<T: Send>(
     let numbered: Vec<(usize, &PathBuf)> = many.files.iter().enumerate().collect();
     let (mut results, mut next) = (BTreeMap::new(), 0);
     let (single, several) = match many.files.as_slice() {
-        [file] => (Some(Working::new(output, file.display().to_string())), None),
+        [file] => (Some(Working::new(output, file.shown().to_string())), None),
         files => (None, Some(Pieces::new(output, "files", files.len()))),
     };
     let work = |&(number, file): &(usize, &PathBuf), tell: &mut dyn FnMut(_) -> bool| {
@@ -123,7 +124,7 @@ pub fn each_file_in_turn<T: Send>(
             Ok(found) => all.done.push(found),
             Err(failure) => {
                 if !all.is_single() {
-                    output.say(&format!("{}: {failure}", file.display()));
+                    output.say(&format!("{}: {failure}", file.shown()));
                 }
                 all.failed.push((file.clone(), failure));
             }
@@ -142,7 +143,7 @@ mod tests {
         let files = (0..50).map(|number| PathBuf::from(number.to_string())).collect();
         let many = FilesArguments { files, jobs: Some(3) };
         let mut told = Vec::new();
-        let work = |file: &PathBuf| match file.display().to_string() {
+        let work = |file: &PathBuf| match file.shown().to_string() {
             name if name == "7" => Err(Failure::usage("not this one")),
             name => Ok(name),
         };

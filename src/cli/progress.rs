@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use avastra_base::outside::in_line;
 use avastra_campaign::train::TrainedEpisode;
-use avastra_lang::syntax::visible;
 
 use super::output::{Output, Telling, plural, remark};
 
@@ -108,9 +108,12 @@ impl Working {
     pub fn new(output: &Output, doing: impl Into<String>) -> Working {
         let bar = (output.telling() == Telling::Bar).then(|| {
             let style = ProgressStyle::with_template("{spinner} {elapsed}, {wide_msg}");
-            let bar = ProgressBar::new_spinner().with_message(visible(&doing.into()).into_owned());
+            let bar = ProgressBar::new_spinner().with_message(in_line(&doing.into()).into_owned());
             bar.set_style(style.expect("a fixed template"));
-            bar.enable_steady_tick(Duration::from_millis(200));
+            // The bar makes a thread for it, and panics where the system gives none.
+            if std::thread::Builder::new().spawn(|| {}).is_ok_and(|tried| tried.join().is_ok()) {
+                bar.enable_steady_tick(Duration::from_millis(200));
+            }
             bar
         });
         Working { _bar: bar }

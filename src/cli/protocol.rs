@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use avastra_base::outside::{in_csv, in_markup};
 use avastra_campaign::run::{Ending, ProtocolTest, Tally};
 
 use super::error::Failure;
 use super::files::write;
-use super::test::escaped;
 
 /// Tests that are listed one by one.
 const LISTED_MAX: usize = 24;
@@ -101,14 +101,10 @@ fn csv(tests: &[ProtocolTest]) -> String {
     let figure = |value: Option<f64>, factor: f64| {
         value.map_or(String::new(), |value| format!("{:.3}", value * factor))
     };
-    let quoted = |text: &str| match text.contains([',', '"', '\n']) {
-        true => format!("\"{}\"", text.replace('"', "\"\"")),
-        false => text.to_owned(),
-    };
     for test in tests {
         let value = |name: &&str| {
             let found = test.values.iter().find(|(known, _)| known == name);
-            format!("{},", found.map_or(String::new(), |(_, value)| quoted(value)))
+            format!("{},", in_csv(found.map_or("", |(_, value)| value)))
         };
         let _ = writeln!(
             text,
@@ -122,11 +118,11 @@ fn csv(tests: &[ProtocolTest]) -> String {
             figure(test.impact_mps, 3.6),
             figure(test.reduction_mps(), 3.6),
             figure(test.relative_mps, 3.6),
-            quoted(test.precrash.as_deref().unwrap_or_default()),
+            in_csv(test.precrash.as_deref().unwrap_or_default()),
             figure(test.ttc_s, 1.0),
             test.counted,
             test.breached.join(" "),
-            quoted(test.refused.as_deref().unwrap_or_default()),
+            in_csv(test.refused.as_deref().unwrap_or_default()),
             test.others_crashed,
         );
     }
@@ -145,7 +141,7 @@ fn junit(suite: &str, tests: &[ProtocolTest]) -> String {
         format!("tests=\"{}\" failures=\"{failed}\" errors=\"0\" skipped=\"{skipped}\"", tests.len());
     let mut text = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"avastra\" {counts}>\n  <testsuite name=\"{}\" {counts}>\n",
-        escaped(suite)
+        in_markup(suite)
     );
     let mut seen: BTreeMap<(&str, String), usize> = BTreeMap::new();
     for test in tests {
@@ -155,18 +151,18 @@ fn junit(suite: &str, tests: &[ProtocolTest]) -> String {
             _ => None,
         };
         let inside = element.map_or_else(String::new, |element| {
-            format!("\n      <{element} message=\"{}\"/>\n    ", escaped(&ended(test)))
+            format!("\n      <{element} message=\"{}\"/>\n    ", in_markup(&ended(test)))
         });
         // Repetitions of a row on its road are told apart by their order.
         let label = test.label();
         let nth = seen.entry((test.road.as_str(), label.clone())).or_insert(0);
         *nth += 1;
         let name = if *nth == 1 { label } else { format!("{label} [{nth}]") };
-        let name = escaped(&name);
+        let name = in_markup(&name);
         let _ = writeln!(
             text,
             "    <testcase classname=\"{}\" name=\"{name}\">{inside}</testcase>",
-            escaped(&test.road)
+            in_markup(&test.road)
         );
     }
     text + "  </testsuite>\n</testsuites>\n"

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use avastra_base::outside::Shown;
 use avastra_campaign::episode::Recorder;
 use avastra_campaign::run::Stage;
 use avastra_drivers::{Selected, Status};
@@ -52,7 +53,7 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
         subject.title = format!("{}: what plays now, not what was recorded", scenario.name);
     }
     let banner = changed.map(|changed| changed.banner(is_same));
-    banner.iter().for_each(|banner| output.warn(&format!("{}: {banner}", arguments.file.display())));
+    banner.iter().for_each(|banner| output.warn(&format!("{}: {banner}", arguments.file.shown())));
     // A strip ends with its scenario.
     if moments.is_empty() || (!arguments.strip && moments.len() < times_s.len()) {
         return Err(Failure::usage(format!(
@@ -66,7 +67,7 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
         output.document(svg.trim_end());
     } else {
         write_result(arguments.output.as_ref(), &path, &svg)?;
-        output.tell(&path.display().to_string());
+        output.tell(&path.shown().to_string());
     }
     let svg = on_stdout.then_some(svg);
     output.result(serde_json::json!({

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use avastra_base::outside::Shown;
 use avastra_campaign::episode::{Breach, Collision, EpisodeLog};
 use avastra_campaign::oracle;
 use avastra_campaign::run::{Asked, Gauges, Stage};
@@ -44,7 +45,7 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
         let profile = arguments.against.ads.as_deref().and_then(load::profile_path);
         let name = match (profile, ads.program()) {
             (_, Some(program)) => program.attached().name(),
-            (Some(path), None) => format!("{} with {}", ads.name(), path.display()),
+            (Some(path), None) => format!("{} with {}", ads.name(), path.shown()),
             (None, None) => ads.name().to_owned(),
         };
         play(&table, &scenario, path, (&ads, Some(name)), changed.as_ref()).map(in_file)
@@ -77,7 +78,7 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
 fn replay_policy(output: &Output, path: &Path, loaded: Loaded, asked: &Asked) -> Result<Replayed, Failure> {
     let (table, policy) = load::policy_in(output, path, loaded)?;
     if !asked.is_nothing() {
-        let (path, word) = (path.display(), for_shell(path));
+        let (path, word) = (path.shown(), for_shell(path));
         return Err(Failure::usage(format!(
             "`{path}` claims what happens with the driving system that it was trained against: `avastra run --policy {word}` \
              plays it with another one"
@@ -99,12 +100,12 @@ struct Tally {
 fn tell(output: &Output, played: &[&Played]) -> Tally {
     let mut tally = Tally::default();
     let (mut files, mut refuted_files) = (0, 0);
-    let banner = |played: &&Played| Some((played.path.display().to_string(), played.banner.clone()?));
+    let banner = |played: &&Played| Some((played.path.shown().to_string(), played.banner.clone()?));
     look::together(played.iter().filter_map(banner)).iter().for_each(|banner| output.warn(banner));
     for played in played {
         files += 1;
         let Some(verdicts) = &played.claims else {
-            output.say(&format!("{} against {}", played.path.display(), played.told));
+            output.say(&format!("{} against {}", played.path.shown(), played.told));
             continue;
         };
         let wrong = verdicts.iter().filter(|verdict| verdict.is_refuted()).count();
@@ -286,14 +287,14 @@ fn report(output: &Output, path: &Path, name: &str, verdicts: &[oracle::ClaimRes
     let untried: Vec<&oracle::ClaimResult> =
         verdicts.iter().filter(|verdict| verdict.confirmed.is_none()).collect();
     if verdicts.is_empty() {
-        output.say(&format!("{}: {} makes no claim", path.display(), name));
+        output.say(&format!("{}: {} makes no claim", path.shown(), name));
         return;
     }
     if wrong.is_empty() {
         let claims = plural(verdicts.len() - untried.len(), "claim");
-        output.tell(&format!("{}: {} holds, {claims} confirmed", path.display(), name));
+        output.tell(&format!("{}: {} holds, {claims} confirmed", path.shown(), name));
     } else {
-        output.say(&format!("{}: {} is refuted", path.display(), name));
+        output.say(&format!("{}: {} is refuted", path.shown(), name));
     }
     for verdict in wrong {
         output.say(&format!("  claimed {}\n  found   {}", verdict.claim, verdict.found));

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use avastra_base::outside::Shown;
 use avastra_campaign::run::{
     Asked, Database, DatabaseError, FoundIn, HeatMap, ProtocolTest, RunSettings, Units, heat_maps, main_maps,
     parameters, recorded,
@@ -108,7 +109,7 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
     write_result(arguments.output.as_ref(), &path, &html)?;
     output.say(&format!(
         "{}: {}, {:.1} MB; open it with a browser",
-        path.display(),
+        path.shown(),
         plural(scenarios, "scenario"),
         html.len() as f64 / 1e6
     ));
@@ -141,7 +142,7 @@ struct Found {
 /// Scenarios, each once.
 fn of_files(paths: &[PathBuf]) -> Result<Found, Failure> {
     if let Some(folder) = paths.iter().find(|path| path.is_dir()) {
-        let folder = folder.display();
+        let folder = folder.shown();
         return Err(Failure::usage(format!(
             "`{folder}` is a folder: a page is about one folder, or about scenarios; name it alone"
         )));
@@ -200,14 +201,14 @@ fn without_settings(directory: &Path) -> Option<String> {
         let settings = kind.settings(directory);
         let how = if settings.exists() { "no file" } else { "missing" };
         let is_one = settings.exists() || kind.database(directory).is_file();
-        is_one.then(|| format!("`{}` is {how}: only scenarios are shown", settings.display()))
+        is_one.then(|| format!("`{}` is {how}: only scenarios are shown", settings.shown()))
     })
 }
 
 /// The failure of a directory without results. `damaged` says which of its rows were changed, if any were.
 fn without_results(directory: &Path, command: &str, damaged: Option<String>) -> Failure {
     let resume = format!("`avastra {command} --resume {}`", for_shell(directory));
-    let directory = directory.display();
+    let directory = directory.shown();
     Failure::usage(match damaged {
         None => format!("`{directory}` has no results yet: finish it with {resume}"),
         Some(damaged) => format!("`{directory}` has no results: {damaged}; {resume} plays them again"),
@@ -233,7 +234,7 @@ fn of_run(
     }
     let path = directory.join("run.db");
     if let Some(how) = run_directory::lost(&path) {
-        return Ok(vec![format!("`{}` is {how}: only scenarios are shown", path.display())]);
+        return Ok(vec![format!("`{}` is {how}: only scenarios are shown", path.shown())]);
     }
     let unread = |error| Failure::file("read", &path, error);
     let (database, changed) = run_directory::open_to_read::<Database>(&path, settings)?;
@@ -264,7 +265,7 @@ fn of_run(
     // A training that is not finished has not been judged yet, and a run never is.
     let results = match database.results() {
         Err(DatabaseError::Results) | Ok(Some(_)) if !is_training => {
-            let path = path.display();
+            let path = path.shown();
             remarks.push(format!("`{path}` has results, which only a training has: they count for nothing"));
             None
         }
@@ -363,7 +364,7 @@ fn scene(output: &Output, file: &Path, compared: Option<&Asked>) -> Result<Scene
     let changed = changed.map(|changed| changed.banner(recording.is_same));
     let is_shrunk = file.parent().is_some_and(|folder| folder.ends_with(shrink::FOLDER));
     let shrunk_from = is_shrunk.then(|| shrink::found_name(&scenario.name).to_owned());
-    Ok(Scene { file: file.display().to_string(), recording, compared, shrunk_from, changed })
+    Ok(Scene { file: file.to_string_lossy().into_owned(), recording, compared, shrunk_from, changed })
 }
 
 /// How many crashes became what with the other driving system, by the page's words for it.
@@ -391,7 +392,7 @@ fn name_apart(scenes: &mut [Scene]) {
 
 fn title(paths: &[PathBuf]) -> String {
     match paths {
-        [path] => path.display().to_string(),
+        [path] => path.shown().to_string(),
         paths => plural(paths.len(), "scenario"),
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use avastra_base::outside::Shown;
 use avastra_campaign::study::Played;
 use avastra_exchange::report::{self, Chapter};
 
@@ -23,7 +24,7 @@ pub fn results(output: &Output, arguments: &ResultsArguments) -> Result<(), Fail
         let path = kept(&arguments.studies, &chapter.name);
         if let Some(kept) = chapter.played.as_ref().filter(|kept| kept.cells.len() > played.cells.len()) {
             let (more, less) = (kept.cells.len(), plural(played.cells.len(), "cell"));
-            let path = path.display();
+            let path = path.shown();
             let reason = format!(
                 "it has {less}, and `{path}` has {more}: `avastra merge` brings shards together; to keep less, remove that file"
             );
@@ -34,15 +35,15 @@ pub fn results(output: &Output, arguments: &ResultsArguments) -> Result<(), Fail
         output.tell(&format!(
             "{} of {} into {}",
             plural(played.cells.len(), "cell"),
-            directory.display(),
-            path.display()
+            directory.shown(),
+            path.shown()
         ));
         chapter.played = Some(played);
     }
     let folder = arguments.studies.to_string_lossy();
     write_named(&arguments.out, &report::results(folder.trim_end_matches('/'), &chapters))?;
     let there = chapters.iter().filter(|chapter| chapter.played.is_some()).count();
-    output.say(&format!("{}: {there} of {} studies are played", arguments.out.display(), chapters.len()));
+    output.say(&format!("{}: {there} of {} studies are played", arguments.out.shown(), chapters.len()));
     let listed = chapters.iter().map(|chapter| {
         let departures = chapter.played.as_ref().map(|played| played.departures(&chapter.wanted));
         serde_json::json!({
@@ -76,7 +77,7 @@ fn chapter(output: &Output, folder: &Path, path: &Path) -> Result<Chapter, Failu
             Some(played.map_err(|reason| Failure::file("read", &kept, reason))?)
         }
     };
-    Ok(Chapter { name, command: format!("avastra study {}", path.display()), file, wanted, played })
+    Ok(Chapter { name, command: format!("avastra study {}", path.shown()), file, wanted, played })
 }
 
 /// Where a played study is kept.

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
+use avastra_base::outside::{Shown, in_line};
 use avastra_exchange::report::draw;
 use avastra_road::{Lane, LaneIndex, LaneKey, LanePlace, Neighbour, RoadMap, Route, Side, SignKind};
 
@@ -68,7 +69,7 @@ fn read(output: &Output, arguments: &RoadArguments) -> Result<(Arc<RoadMap>, Opt
         let named = |name: &String| roads.iter().find(|road| road.name == *name);
         let road = arguments.road.as_ref().map_or(roads.first(), named).ok_or_else(|| {
             let names: Vec<_> = roads.iter().map(|road| format!("`{}`", road.name)).collect();
-            let (path, names) = (path.display(), names.join(", "));
+            let (path, names) = (path.shown(), names.join(", "));
             Failure::usage(if names.is_empty() {
                 format!("`{path}` declares no road")
             } else {
@@ -109,7 +110,7 @@ fn words(map: &RoadMap, route: Option<&Route>, warnings: &[String]) -> String {
     let length_m: f64 = map.lanes.iter().map(|lane| lane.centre.length_m()).sum();
     let mut lines = vec![format!(
         "map `{}`: {} with {} of {length_m:.1} m in all, {}, {}, {}",
-        map.name,
+        in_line(&map.name),
         plural(roads.len(), "road"),
         plural(map.lanes.len(), "driving lane"),
         plural(map.junctions.len(), "junction"),
@@ -121,7 +122,7 @@ fn words(map: &RoadMap, route: Option<&Route>, warnings: &[String]) -> String {
         let ways = map.connections(index);
         let ways: Vec<String> =
             ways.iter().map(|way| format!("{} to {}", name(map, way.from), name(map, way.to))).collect();
-        let title = if junction.name.is_empty() { &junction.id } else { &junction.name };
+        let title = in_line(if junction.name.is_empty() { &junction.id } else { &junction.name });
         let groups = plural(junction.groups, "signal group");
         lines.push(format!("junction `{title}`: {groups}; {}", listed(&ways)));
     }
@@ -135,13 +136,13 @@ fn words(map: &RoadMap, route: Option<&Route>, warnings: &[String]) -> String {
         let (x, y) = (signal.position.x, signal.position.y);
         lines.push(format!(
             "signal `{}` at {x:.1}, {y:.1}: group {}; stops {}",
-            signal.id,
+            in_line(&signal.id),
             signal.group,
             listed(&names(map, &signal.lanes))
         ));
     }
     lines.extend(route.map(|route| route_words(map, route)));
-    lines.extend(warnings.iter().map(|warning| format!("warning: {warning}")));
+    lines.extend(warnings.iter().map(|warning| format!("warning: {}", in_line(warning))));
     lines.join("\n")
 }
 
@@ -322,7 +323,7 @@ fn keys<'a>(map: &'a RoadMap, lanes: &[LaneIndex]) -> Vec<&'a LaneKey> {
 fn name(map: &RoadMap, lane: LaneIndex) -> String {
     let key = &map.lane(lane).key;
     let section = if key.section > 0 { format!(" (section {})", key.section) } else { String::new() };
-    format!("{}/{}{section}", key.road, key.lane)
+    format!("{}/{}{section}", in_line(&key.road), key.lane)
 }
 
 fn names(map: &RoadMap, lanes: &[LaneIndex]) -> Vec<String> {

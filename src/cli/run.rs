@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use avastra_base::outside::Shown;
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::oracle;
@@ -89,7 +90,7 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
         None => begun(output, arguments)?,
     };
     let Some(((run, directory), elsewhere)) = begun else { return Ok(()) };
-    output.tell(&format!("{}, into {}", heading(&run), directory.path.display()));
+    output.tell(&format!("{}, into {}", heading(&run), directory.path.shown()));
     elsewhere.iter().for_each(|text| output.warn(text));
     let found = play_all(output, (run, directory), elsewhere, arguments.jobs)?;
     if arguments.fail_on_collision && found.counted > 0 {
@@ -185,7 +186,7 @@ fn play_all(
         output.say(&protocol::in_words(&tests));
     }
     if let [table, cases] = tables.as_slice() {
-        output.say(&format!("each row: {}, {}", table.display(), cases.display()));
+        output.say(&format!("each row: {}, {}", table.shown(), cases.shown()));
     }
     let never = Never::new(run.table(), &directory.read(Database::rows)?);
     // A protocol says of each row what came of it.
@@ -199,7 +200,7 @@ fn play_all(
         let kept = plural(kept.len(), "episode");
         output.say(&format!(
             "{kept} without a finding, the nearest misses first, in {}/kept",
-            directory.path.display()
+            directory.path.shown()
         ));
     }
     if critical.is_empty() && kept.is_empty() && is_over && !is_protocol {
@@ -207,7 +208,7 @@ fn play_all(
     }
     let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {
-        let place = format!("; each is in {}/failures", directory.path.display());
+        let place = format!("; each is in {}/failures", directory.path.shown());
         output.say(&failures_text(&failures, &place));
     }
     thinking_text(program).iter().for_each(|text| output.say(text));
@@ -315,7 +316,7 @@ fn ready(
     let labels =
         |table: &ActionTable| -> Vec<String> { table.rows().iter().map(|row| row.label.clone()).collect() };
     if labels(own) != labels(&table) {
-        let (name, path) = (&policy.name, table.space().path.display());
+        let (name, path) = (&policy.name, table.space().path.shown());
         return Err(Failure::usage(format!(
             "`{name}` was trained for another action table than that of `{path}`"
         )));
@@ -412,7 +413,7 @@ fn heading(run: &Run) -> String {
     let ads = run.arena().ads_name();
     format!(
         "{}: {} against {}{}, {} on {}{ambient}{traffic}, seed {}",
-        run.space().path.display(),
+        run.space().path.shown(),
         settings.agent,
         ads,
         profile_text(settings.profile.as_ref()),
@@ -600,7 +601,7 @@ pub fn critical_text(directory: &Path, files: &[PathBuf], found: &[FoundIn]) -> 
     let line = |file: &PathBuf| {
         let of = file.file_stem().and_then(|stem| by_name.get(&*stem.to_string_lossy()));
         let told = of.map_or_else(String::new, |of| format!("  {}", of.in_words()));
-        format!("{}{told}", file.display())
+        format!("{}{told}", file.shown())
     };
     let head = format!("\n{} with a counted collision or a breach:", plural(files.len(), "scenario"));
     let mut text = cut_short(head, files, line, |more| format!("and {more} more"));

@@ -8,13 +8,13 @@
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
-use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use avastra_base::outside::Shown;
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
-use avastra_campaign::files;
+use avastra_campaign::files::{self, Lock};
 use avastra_campaign::oracle::Found;
 use avastra_campaign::run::{
     DatabaseError, EpisodeSummary, Near, Numbered, Shard, Units, VERSION, WrittenScenario,
@@ -33,7 +33,7 @@ use super::output::{Output, for_shell, plural};
 use super::{pack, shard};
 
 /// The folders that a run, a training or an estimate writes into.
-const FOLDERS: [&str; 4] = ["critical", "failures", KEPT, "policy"];
+const FOLDERS: [&str; 5] = ["critical", "failures", KEPT, "policy", pack::SPACE];
 
 /// The folder of episodes in which nothing was found, and which were asked for all the same.
 pub const KEPT: &str = "kept";
@@ -41,8 +41,8 @@ pub const KEPT: &str = "kept";
 /// A directory that no other process works in while this lives.
 pub struct Held {
     pub path: PathBuf,
-    /// The lock is on the directory itself, and ends with the process however that ends.
-    _lock: Option<File>,
+    /// The lock is on the directory itself.
+    _lock: Lock,
 }
 
 /// The directory of a campaign, with its database.
@@ -80,14 +80,12 @@ pub fn create(
 
 /// Takes a directory for this process alone.
 pub fn hold(path: &Path) -> Result<Held, Failure> {
-    // Where folders cannot be opened or locked, as on some network drives, there is no lock.
-    let lock = File::open(path).ok();
-    if let Some(Err(TryLockError::WouldBlock)) = lock.as_ref().map(File::try_lock) {
-        let path = path.display();
-        return Err(Failure::usage(format!(
+    let lock = Lock::of_folder(path).map_err(|_| {
+        let path = path.shown();
+        Failure::usage(format!(
             "another avastra is at work in `{path}`: wait for it, or name another directory"
-        )));
-    }
+        ))
+    })?;
     Ok(Held { path: path.to_owned(), _lock: lock })
 }
 
@@ -141,14 +139,14 @@ pub fn resume<C: Campaign>(
     {
         return Err(Failure::usage(format!(
             "`{}` holds a {found}: go on with `avastra {command} --resume {}`",
-            directory.display(),
+            directory.shown(),
             for_shell(directory)
         )));
     }
     if !path.is_file() {
         return Err(Failure::usage(format!(
             "`{}` is no {kind} directory: it has no {kind}.yaml; begin one with `--out {}`",
-            directory.display(),
+            directory.shown(),
             for_shell(directory)
         )));
     }
@@ -161,7 +159,7 @@ pub fn resume<C: Campaign>(
     if let Some(how) = lost.filter(|_| !left.is_empty()) {
         return Err(Failure::usage(format!(
             "`{}` is {how}, and `critical` has scenarios: begin a new {what}, or delete them to begin this one anew",
-            database.display()
+            database.shown()
         )));
     }
     let (mut settings, text) = settings_of::<C>(directory)?;
@@ -173,7 +171,7 @@ pub fn resume<C: Campaign>(
         let differences = differences.map_or_else(String::new, |found| format!(" ({found})"));
         return Err(Failure::usage(format!(
             "`{}` has changed since the {what} was begun{differences}: begin a new one",
-            table.space().path.display()
+            table.space().path.shown()
         )));
     }
     if C::KIND.keeps_space {
@@ -188,7 +186,7 @@ pub fn resume<C: Campaign>(
     }
     // What cannot be gone on with does not begin anew either.
     if let Some(how) = lost {
-        output.tell(&format!("`{}` is {how}: the {what} begins anew", database.display()));
+        output.tell(&format!("`{}` is {how}: the {what} begins anew", database.shown()));
     }
     if let Some(attached) = external.as_ref().filter(|attached| !attached.is_recorded) {
         // Nothing on the command line names it.
@@ -207,17 +205,14 @@ pub fn lost(database: &Path) -> Option<&'static str> {
 
 /// Says what a directory's settings start or reach, and how.
 fn named_in(file: &Path, settings: &ExternalSettings) -> String {
-    let (file, command) = (file.display(), settings.command.text());
+    let (file, command) = (file.shown(), settings.command.text());
     if settings.command.is_socket() {
         return format!("`{file}` names the driving system, which is reached now: {command}");
     }
     let folder = settings.working_directory.as_deref().map(normal);
     let folder = folder.filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(PathBuf::from("."));
     let env: String = settings.env.iter().map(|(name, value)| format!("{name}={value} ")).collect();
-    format!(
-        "`{file}` names the driving system, which is started now in `{}`: {env}{command}",
-        folder.display()
-    )
+    format!("`{file}` names the driving system, which is started now in `{}`: {env}{command}", folder.shown())
 }
 
 /// The copy of the space in a directory.
@@ -259,7 +254,7 @@ pub fn remark_on_copy(directory: &Path) -> Option<String> {
     let text = load::read(&kind.settings(directory)).ok()?;
     let Begun { space, space_digest } = serde_yaml::from_str(&text).ok()?;
     let copy = directory.join(pack::SPACE);
-    let copy = copy.display();
+    let copy = copy.shown();
     match copied(directory, &space, &space_digest) {
         Copied::Sound => None,
         Copied::Edited => Some(format!(
@@ -287,7 +282,7 @@ fn restore_copy(
         Copied::Edited => remark_on_copy(directory).iter().for_each(|remark| output.warn(remark)),
         Copied::Gone => {
             let copy = pack::pack_space(there, directory)?;
-            output.tell(&format!("{}: was missing, is written again", copy.display()));
+            output.tell(&format!("{}: was missing, is written again", copy.shown()));
         }
     }
     Ok(())
@@ -295,13 +290,13 @@ fn restore_copy(
 
 /// Makes a directory ready to be resumed: refuses folders that are links, and removes partial files that a kill left.
 fn tidy(directory: &Path) -> Result<(), Failure> {
-    let swept = |folder: &Path| files::sweep(folder).map_err(|error| Failure::file("tidy", folder, error));
-    swept(directory)?;
+    files::sweep(directory).map_err(|error| Failure::file("tidy", directory, error))?;
     for name in FOLDERS {
         let folder = directory.join(name);
         files::own_folder(&folder).map_err(|error| Failure::file("use", &folder, error))?;
         if folder.is_dir() {
-            swept(&folder)?;
+            // The copy of a space has folders of its own.
+            files::sweep_all(&folder).map_err(|error| Failure::file("tidy", &folder, error))?;
         }
     }
     Ok(())
@@ -316,7 +311,7 @@ pub fn settings_of<C: Campaign>(directory: &Path) -> Result<(C, String), Failure
     if (begun.engine.as_str(), begun.avastra.as_str()) != (ENGINE, VERSION) {
         return Err(Failure::usage(format!(
             "the {what} in `{}` was begun by avastra {} in world `{}`, this is avastra {VERSION} in `{ENGINE}`: begin a new one",
-            directory.display(),
+            directory.shown(),
             begun.avastra,
             begun.engine
         )));
@@ -361,7 +356,7 @@ fn is_gone(path: &Path) -> bool {
 /// Remarks for a page about scenarios that were edited or are missing.
 pub fn remarks_on(written: &[WrittenFile]) -> Vec<String> {
     let edited = written.iter().filter(|file| is_edited(file));
-    let edited = edited.map(|(path, _)| format!("{} was edited since it was written", path.display()));
+    let edited = edited.map(|(path, _)| format!("{} was edited since it was written", path.shown()));
     let gone = written.iter().filter(|(path, _)| is_gone(path)).count();
     let gone = (gone > 0).then(|| {
         format!("{} gone from `critical`: `--resume` writes what is missing again", plural(gone, "scenario"))
@@ -380,7 +375,7 @@ fn foreign(directory: &Path, written: &[WrittenFile]) -> Vec<PathBuf> {
 /// Says which scenarios in `critical` are [`foreign`], if any.
 pub fn foreign_text(kind: &Kind, directory: &Path, written: &[WrittenFile]) -> Option<String> {
     let files = foreign(directory, written);
-    let named: Vec<String> = files.iter().take(NAMED_MAX).map(|path| path.display().to_string()).collect();
+    let named: Vec<String> = files.iter().take(NAMED_MAX).map(|path| path.shown().to_string()).collect();
     let more = files.len() - named.len();
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     (!files.is_empty()).then(|| {
@@ -388,7 +383,7 @@ pub fn foreign_text(kind: &Kind, directory: &Path, written: &[WrittenFile]) -> O
             "{}{more}: not written by this {}, as far as `{}` tells",
             named.join(", "),
             kind.what,
-            kind.database(directory).display()
+            kind.database(directory).shown()
         )
     })
 }
@@ -434,7 +429,7 @@ fn changed<D: Units>(file: &Path, damaged: &[i64]) -> String {
     let named: Vec<String> = damaged.iter().take(NAMED_MAX).map(|&number| D::called(number)).collect();
     let more = damaged.len() - named.len();
     let more = if more > 0 { format!(" and of {more} more") } else { String::new() };
-    let file = file.display();
+    let file = file.shown();
     format!("`{file}`: the rows of {}{more} were changed since they were written", named.join(", "))
 }
 
@@ -511,7 +506,7 @@ impl<C: Campaign> Directory<C> {
         Err(Failure::usage(format!(
             "`{}` is not played to the end, and no program that a file names is started for that: look at its \
              settings, then go on with `avastra {} --resume {}`",
-            self.path.display(),
+            self.path.shown(),
             C::KIND.command,
             for_shell(&self.path)
         )))
@@ -526,11 +521,11 @@ impl<C: Campaign> Directory<C> {
         let mut restored = Vec::new();
         for (unit, (path, text)) in units.into_iter().zip(&written).filter(|(_, (path, _))| is_gone(path)) {
             write(path, text)?;
-            output.tell(&format!("{}: was missing, is written again", path.display()));
+            output.tell(&format!("{}: was missing, is written again", path.shown()));
             restored.push((unit, path.clone()));
         }
         let edited = written.iter().filter(|file| is_edited(file));
-        let edited: Vec<String> = edited.map(|(path, _)| path.display().to_string()).collect();
+        let edited: Vec<String> = edited.map(|(path, _)| path.shown().to_string()).collect();
         if !edited.is_empty() {
             let (what, files) = (C::KIND.what, if edited.len() == 1 { "it" } else { "them" });
             output.tell(&format!(
@@ -648,10 +643,11 @@ fn make_empty(path: &Path) -> Result<Held, Failure> {
     if !is_unbegun(path).map_err(|error| Failure::file("read", path, error))? {
         return Err(Failure::usage(format!(
             "`{}` is not empty: name a new directory, or go on with `--resume {}`",
-            path.display(),
+            path.shown(),
             for_shell(path)
         )));
     }
+    tidy(path)?;
     Ok(held)
 }
 
@@ -659,7 +655,7 @@ fn make_empty(path: &Path) -> Result<Held, Failure> {
 pub fn refuse_used(out: Option<&Path>) -> Result<(), Failure> {
     match out.filter(|path| path.exists()) {
         Some(path) if !path.is_dir() => {
-            Err(Failure::usage(format!("`{}` is no directory: name a new one", path.display())))
+            Err(Failure::usage(format!("`{}` is no directory: name a new one", path.shown())))
         }
         Some(path) => make_empty(path).map(drop),
         None => Ok(()),

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use avastra_base::outside::Shown;
 use avastra_campaign::emit;
 use avastra_campaign::episode::{Outcome, Script, Setup};
 use avastra_campaign::oracle::{self, Found, MIXED, Worth};
@@ -33,7 +34,7 @@ pub fn found_name(shrunk: &str) -> &str {
 /// Writes each file's scenario as small as possible, and checks every claim of what it wrote.
 pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failure> {
     if let Some(path) = arguments.output.as_ref().filter(|_| arguments.many.files.len() > 1) {
-        let path = path.display();
+        let path = path.shown();
         return Err(Failure::usage(format!(
             "`--out {path}` is for one file: of several, each is written to a folder `{FOLDER}`"
         )));
@@ -98,7 +99,7 @@ impl Small {
     fn in_words(&self) -> String {
         format!(
             "{}: {} with {} became {} with {} ({} played)",
-            self.path.display(),
+            self.path.shown(),
             plural(self.before.0, "step"),
             plural(self.before.1, "action"),
             plural(self.after.0, "step"),

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use std::time::Instant;
 
+use avastra_base::outside::Shown;
 use avastra_campaign::run::{DatabaseError, Numbered, RunError, TrafficRecord};
 use avastra_campaign::study::{
     CellRecord, Event, FailedCell, Job, Spent, Study, StudyDatabase, StudyError, StudyFile, StudyResults,
@@ -92,6 +93,8 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
             let study = Study::new(table, settings.started_unless(arguments.shard.dry_run))
                 .map_err(|error| Failure::file("use", file, error))?;
             if arguments.shard.dry_run {
+                // What a driving system that was not started has played cannot be compared, but it can be read.
+                arguments.reuse.iter().try_for_each(|directory| read(directory).map(drop))?;
                 let costs = costs(&study.settings().work());
                 let episodes = plural(costs.iter().sum::<u64>() as usize, "episode");
                 let what = format!("{} trainings or repetitions, {episodes} together", costs.len());
@@ -121,7 +124,7 @@ fn play_all(
     let stop = stop_on_interrupt();
     let share = Share::of(&path, study.settings())?;
     let all = study.settings().jobs();
-    output.tell(&format!("{}, into {}", heading(&study), path.display()));
+    output.tell(&format!("{}, into {}", heading(&study), path.shown()));
     let mut times = Times::read(&path);
     for Reused { directory: other, played } in reused {
         let lacking = share.lacking(study.settings(), &directory)?;
@@ -133,7 +136,7 @@ fn play_all(
         }
         times.write(&path)?;
         let count = plural(new.iter().map(|(_, cells)| cells.len()).sum(), "cell");
-        output.tell(&format!("{count} taken over from {}", other.display()));
+        output.tell(&format!("{count} taken over from {}", other.shown()));
     }
     let left = share.lacking(study.settings(), &directory)?;
     let todo: Vec<Job> = left.iter().map(|&job| all[job].clone()).collect();
@@ -242,12 +245,12 @@ pub fn read_sound(directory: &Path) -> Result<Sound, Failure> {
     if !path.is_file() {
         return Err(Failure::usage(format!(
             "`{}` is no study's directory: `avastra study FILE --out {}` makes one",
-            directory.display(),
+            directory.shown(),
             for_shell(directory)
         )));
     }
     if let Some(how) = run_directory::lost(&file) {
-        let (file, directory) = (file.display(), for_shell(directory));
+        let (file, directory) = (file.shown(), for_shell(directory));
         return Err(Failure::usage(format!(
             "`{file}` is {how}: go on with `avastra study --resume {directory}`"
         )));
@@ -279,7 +282,7 @@ fn failed_text(directory: &Path, cells: &[FailedCell]) -> String {
     text.push_str(&format!(
         "\nwhat was played stands in {}; when the driving system is repaired (`avastra ads check`), begin the study \
          again in a new folder",
-        directory.join("study.db").display()
+        directory.join("study.db").shown()
     ));
     text
 }
@@ -305,7 +308,7 @@ pub fn wanted(
     let read = |name: &str| load::read(&beside(name)).map_err(|error| error.to_string());
     let traffic = file.traffic.as_ref().map(|wanted| {
         // A file lies beside the study's.
-        if load::is_yaml(wanted) { beside(wanted).display().to_string() } else { wanted.clone() }
+        if load::is_yaml(wanted) { beside(wanted).to_string_lossy().into_owned() } else { wanted.clone() }
     });
     let traffic =
         traffic.as_deref().map(load::traffic).transpose().map_err(|error| refuse(error.to_string()))?;
@@ -331,7 +334,7 @@ fn heading(study: &Study) -> String {
     let labels: Vec<&str> = settings.agents.iter().map(|agent| agent.label.as_str()).collect();
     format!(
         "{}: {} against {} on {}, {} a seed, {}, first seed {}",
-        study.table().space().path.display(),
+        study.table().space().path.shown(),
         labels.join(", "),
         study.ads_name(),
         settings.roads.join(", "),
@@ -345,7 +348,7 @@ fn heading(study: &Study) -> String {
 fn spent() -> Spent {
     let now = now();
     // On Linux, the first word of this file is the thread's time on a processor, ns.
-    let schedule = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let schedule = load::read(Path::new("/proc/thread-self/schedstat")).ok();
     let on_cpu_ns = schedule.and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
     Spent { wall_s: now.duration_since(*BEGAN).as_secs_f64(), cpu_s: on_cpu_ns.map(|ns| ns / 1e9) }
 }
@@ -385,7 +388,7 @@ fn timing(cells: &[CellRecord]) -> Vec<Timing> {
 }
 
 fn timing_text(directory: &Path, timing: &[Timing]) -> String {
-    let mut text = format!("\nall figures: {}", directory.join("results.json").display());
+    let mut text = format!("\nall figures: {}", directory.join("results.json").shown());
     for Timing { agent, cells, wall_s, cpu_s, timed } in timing {
         let cells = plural(*cells, "cell");
         let Some(wall_s) = wall_s else {

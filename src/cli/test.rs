@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use avastra_base::outside::{Shown, in_markup};
 use avastra_base::statistics::proportion;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::files;
@@ -96,7 +97,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         accepted += usize::from(notes.is_accepted);
     }
     played.complete("played")?;
-    let named: Vec<String> = arguments.paths.iter().map(|path| path.display().to_string()).collect();
+    let named: Vec<String> = arguments.paths.iter().map(|path| path.shown().to_string()).collect();
     let named = named.join(" ");
     if cases.is_empty() {
         return Err(Failure::usage(format!("no scenario in `{named}`")));
@@ -190,7 +191,7 @@ fn tell(output: &Output, (case, notes): &(Case, Notes)) {
     notes.said.iter().for_each(|line| output.say(line));
     let (word, reason) = case.in_words();
     let reason = if reason.is_empty() { String::new() } else { format!(": {reason}") };
-    output.tell(&format!("{word:<12}{}{reason}", case.file.display()));
+    output.tell(&format!("{word:<12}{}{reason}", case.file.shown()));
 }
 
 /// The files of a suite, each once: files as named, those of directories, and those that a run found.
@@ -350,7 +351,7 @@ impl Suite<'_> {
         let Emitted::Scenario(table, scenario) = &emitted else { return Ok((emitted, None)) };
         let Review { change, mut differences, illegal, now } = review(table, scenario, &self.asked, &text)?;
         differences.splice(0..0, spaces);
-        notes.said.push(format!("{}: {}", file.display(), change.in_words()));
+        notes.said.push(format!("{}: {}", file.shown(), change.in_words()));
         notes.said.extend(differences.iter().map(|difference| format!("    {difference}")));
         notes.reviewed = Some(serde_json::json!({
             "file": file, "scenario": scenario.name, "change": change.in_words(), "differences": differences,
@@ -585,14 +586,14 @@ fn junit(suite: &str, cases: &[Case]) -> String {
         count(Outcome::is_skipped),
         cases.iter().map(|case| case.elapsed_s).sum::<f64>()
     );
-    let name = escaped(suite);
+    let name = in_markup(suite);
     let mut text = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"avastra\" {counts}>\n  \
          <testsuite name=\"{name}\" {counts}>\n"
     );
     for case in cases {
         let (word, reason) = case.in_words();
-        let reason = escaped(&reason);
+        let reason = in_markup(&reason);
         let element = match &case.outcome {
             Outcome::NotPlayed { .. } => Some("error"),
             outcome if outcome.is_failure() => Some("failure"),
@@ -608,36 +609,17 @@ fn junit(suite: &str, cases: &[Case]) -> String {
         let name = if is_alone {
             case.scenario.clone()
         } else {
-            format!("{} ({})", case.scenario, case.file.display())
+            format!("{} ({})", case.scenario, case.file.shown())
         };
         text.push_str(&format!(
             "    <testcase classname=\"{}\" name=\"{}\" time=\"{:.3}\">{inside}</testcase>\n",
-            escaped(&case.road),
-            escaped(&name),
+            in_markup(&case.road),
+            in_markup(&name),
             case.elapsed_s
         ));
     }
     text.push_str("  </testsuite>\n</testsuites>\n");
     text
-}
-
-/// Text as it may stand in an XML attribute; what XML cannot hold at all becomes U+FFFD.
-pub(super) fn escaped(text: &str) -> String {
-    let mut escaped = String::new();
-    for letter in text.chars() {
-        match letter {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\n' | '\t' | '\r' => escaped.push(' '),
-            letter if letter.is_control() || matches!(letter, '\u{fffe}' | '\u{ffff}') => {
-                escaped.push('\u{fffd}');
-            }
-            letter => escaped.push(letter),
-        }
-    }
-    escaped
 }
 
 #[cfg(test)]

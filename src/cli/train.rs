@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use avastra_base::outside::Shown;
 use avastra_campaign::emit;
 use avastra_campaign::episode::{Breach, Script};
 use avastra_campaign::oracle;
@@ -235,13 +236,13 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
             if let Some(rules) = rules {
                 output.say(&rules_text(policy.rules.len(), evaluation.return_mean, rules));
             }
-            output.say(&format!("{}\nplay it with: avastra run --policy {}", path.display(), for_shell(path)))
+            output.say(&format!("{}\nplay it with: avastra run --policy {}", path.shown(), for_shell(path)))
         }
         None => output.say(&search_text(&directory.path, &critical)),
     }
     let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {
-        let place = format!(" in the training; each is in {}/failures", directory.path.display());
+        let place = format!(" in the training; each is in {}/failures", directory.path.shown());
         output.say(&failures_text(&failures, &place));
     }
     if !evaluation.failures.is_empty() {
@@ -322,7 +323,7 @@ fn search_text(directory: &Path, critical: &[PathBuf]) -> String {
         0 => "a search has no policy file; no scenario was written".to_owned(),
         found => {
             let critical = directory.join("critical");
-            format!("a search has no policy file: {} in {}", plural(found, "scenario"), critical.display())
+            format!("a search has no policy file: {} in {}", plural(found, "scenario"), critical.shown())
         }
     }
 }
@@ -421,7 +422,7 @@ fn heading(training: &Training, directory: &Path) -> String {
     });
     format!(
         "{}: {} ({}{network}) against {}{}, {} on {}, seed {}, into {}",
-        training.table().space().path.display(),
+        training.table().space().path.shown(),
         settings.agent,
         settings.hyperparameters.preset(),
         training.arena().ads_name(),
@@ -429,6 +430,6 @@ fn heading(training: &Training, directory: &Path) -> String {
         plural(settings.episodes as usize, "episode"),
         settings.roads.join(", "),
         settings.seed,
-        directory.display()
+        directory.shown()
     )
 }

@@ -4,6 +4,7 @@
 use core::fmt::Write;
 use std::collections::BTreeSet;
 
+use avastra_base::outside::Shown;
 use avastra_base::units::{self, Rational};
 use avastra_lang::check::{Declaration, Symbol};
 use avastra_lang::model::vocabulary::{Word, WorldState};
@@ -64,7 +65,7 @@ fn owner(symbol: &Symbol) -> Option<&str> {
 pub fn describe(analysis: &Analysis, symbol: &Symbol) -> Option<String> {
     let references = analysis.references();
     match symbol {
-        Symbol::File(path) => return Some(format!("`{}`", path.display())),
+        Symbol::File(path) => return Some(format!("`{}`", path.shown())),
         Symbol::Engine(word, meaning) => return Some(format!("**{word}**\n\n{meaning}")),
         Symbol::Type(name) => {
             return Some(format!("**{name}**\n\n{}", words::meaning(&words::types(), name)?));

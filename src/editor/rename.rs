@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use avastra_base::outside::Shown;
 use avastra_lang::check::{Loaded, Symbol};
 use avastra_lang::model::COUNTED;
 use avastra_lang::model::vocabulary::{Word, WorldState};
@@ -125,7 +126,7 @@ fn broken(known: &Analysis) -> Option<String> {
     let broken = known.loaded.diagnostics.iter().find(|found| is_syntax(found))?;
     let file = broken.place().map_or(Analysis::ROOT, |place| place.file);
     let file = known.path(file).unwrap_or(Path::new(""));
-    Some(format!("repair the syntax of `{}` first: {}", file.display(), broken.message))
+    Some(format!("repair the syntax of `{}` first: {}", file.shown(), broken.message))
 }
 
 /// The files with the symbols under another name: their texts, and the changes for the editor.

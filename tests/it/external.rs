@@ -103,6 +103,63 @@ fn every_misbehaviour_is_a_finding_and_leaves_nothing_behind() {
     }
 }
 
+/// A driving system that answers as it should until its third step, and then reports an error.
+const REPORTING: &str = r#"#!/bin/sh
+answer() { printf '%s\n' "$1"; }
+while read -r line; do
+  case $line in
+    '{"type":"init"'*) answer '{"type":"ready","protocol":"avastra-ads/1","name":"mine","version":"1","answer":"acceleration","deterministic":true}' ;;
+    '{"type":"map"'* | '{"type":"reset"'*) answer '{"type":"ready"}' ;;
+    '{"type":"step","seq":3,'*) answer '{"type":"error","message":MESSAGE}' ;;
+    '{"type":"step"'*) seq=${line#*'"seq":'}; answer "{\"type\":\"acceleration\",\"seq\":${seq%%,*},\"accel\":0.5}" ;;
+    '{"type":"close"'*) exit 0 ;;
+  esac
+done
+"#;
+
+/// A message may hold what would be a declaration, the end of a comment, a line of the output or a command to continuous
+/// integration.
+#[test]
+fn what_a_program_reports_is_neither_code_nor_a_line() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let forged = "require injected: ego.speed <= 1 m/s";
+    let messages = [
+        format!("x\n{forged}\n///"),
+        format!("x\r\n{forged}\r\n*/ {forged}"),
+        format!("x\u{2028}{forged}\u{85}{forged}\u{202e}\r{forged}"),
+        "x\nuse \"injected.ava\"\n///".to_owned(),
+        "::error title=forged::x\n::error::forged\n ##vso[task.forged]\n##[error]forged".to_owned(),
+        "Traceback (most recent call last):\n  File \"drive.py\", line 3, in <module>\n\u{1b}[2JKeyError: 'x'\n".to_owned(),
+    ];
+    for (number, message) in messages.iter().enumerate() {
+        let folder = scratch.path().join(number.to_string());
+        std::fs::create_dir(&folder).expect("it is writable");
+        let program = folder.join("drive.sh");
+        let message = serde_json::to_string(message).expect("it is a text").replace('\'', r"\u0027");
+        std::fs::write(&program, REPORTING.replace("MESSAGE", &message)).expect("it is writable");
+        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o700)).expect("it is ours");
+        let (program, out) = (program.display().to_string(), folder.join("run").display().to_string());
+        let words = ["run", SPACE, "--road", "corner", "--ads", &program, "--out", &out, "--episodes", "1"];
+        let (_, stdout, stderr) = outcome(&mut avastra(&words));
+        let said = format!("{stdout}{stderr}");
+        assert!(stdout.contains("ads_error (reported)"), "{said}");
+        let is_forged = |line: &&str| {
+            let begins = ["require", "use", "::", "KeyError", "File"];
+            begins.iter().any(|word| line.trim_start().starts_with(word)) || line.contains("##")
+        };
+        assert_eq!(said.lines().find(is_forged), None, "{said}");
+        assert!(!said.contains(|c: char| c != '\n' && c.is_control() || c == '\u{2028}'), "{said:?}");
+        let scenario = folder.join("run/failures/corner_0000.ava");
+        let text = std::fs::read_to_string(&scenario).expect("it is written");
+        let code = |line: &&str| !line.trim_start().starts_with("//");
+        assert!(!text.lines().filter(code).any(|line| line.contains("injected")), "{text}");
+        let scenario = scenario.display().to_string();
+        done(&["check", &scenario]);
+        done(&["fmt", "--check", &scenario]);
+        done(&["replay", &scenario]);
+    }
+}
+
 #[test]
 fn what_cannot_be_reached_any_more_is_given_up() {
     let scratch = tempfile::tempdir().expect("a scratch directory");

@@ -1,5 +1,6 @@
 //! What the text of the sources shows: each module of a crate uses only those to its left (between crates the compiler keeps
-//! that), one file alone names parry2d, `cli` alone touches files and the environment, and `campaign/files` alone writes.
+//! that), one file alone names parry2d, `cli` alone touches files and the environment, `campaign/files` alone writes, `cli/load`
+//! alone reads, one function opens databases, and what is from outside is written by the function of its place.
 
 use std::path::{Path, PathBuf};
 
@@ -77,7 +78,7 @@ fn cli_alone_touches_files_and_the_environment() {
 }
 
 /// Calls that make, replace, rename or remove files and folders.
-const WRITING: [&str; 13] = [
+const WRITING: [&str; 12] = [
     "File::create",
     "File::options",
     "OpenOptions",
@@ -90,35 +91,87 @@ const WRITING: [&str; 13] = [
     "fs::set_permissions",
     "fs::symlink(",
     "DirBuilder",
-    "Connection::open(",
 ];
 
-/// SQLite writes by itself. These files check the path first, or have it from `files`.
-const WRITING_DATABASES: [&str; 2] = ["src/campaign/run/sealed.rs", "src/campaign/run/settled.rs"];
-
-#[test]
-fn files_alone_writes_and_removes() {
-    let is_test = |path: &Path| {
-        let name = path.strip_prefix(root()).expect("it is below").to_string_lossy().into_owned();
-        name.contains("/tests") || name.ends_with("testing.rs")
-    };
+/// Refuses words in the source, but for comments, tests and the files where each may stand.
+fn stands_nowhere_else(words: &[&str], may: &dyn Fn(&Path, &str) -> bool, instead: &str) {
+    let mut wrong = Vec::new();
     for path in sources(&root().join("src")) {
-        if path == root().join("src/campaign/files.rs") || is_test(&path) {
+        let inside = path.strip_prefix(root()).expect("it is below");
+        let name = inside.to_string_lossy();
+        if name.contains("/tests") || name.ends_with("testing.rs") {
             continue;
         }
         let text = std::fs::read_to_string(&path).expect("a source file is readable");
-        let text = without_tests(&text);
-        let is_database = WRITING_DATABASES.iter().any(|name| path.ends_with(name));
-        for (number, line) in
-            text.lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//"))
-        {
-            for word in WRITING.iter().filter(|word| line.contains(**word)) {
-                let may = is_database && *word == "Connection::open(";
-                let place = format!("{}:{}", path.display(), number + 1);
-                assert!(may, "{place} names `{word}`: `files` does that, and follows no link");
-            }
+        let lines = without_tests(&text).lines().enumerate();
+        for (number, line) in lines.filter(|(_, line)| !line.trim_start().starts_with("//")) {
+            let found = words.iter().filter(|word| line.contains(**word) && !may(inside, word));
+            wrong.extend(found.map(|word| format!("{name}:{} names `{word}`", number + 1)));
         }
     }
+    assert!(wrong.is_empty(), "{instead}:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn files_alone_writes_and_removes() {
+    let may = |path: &Path, _: &str| path == Path::new("src/campaign/files.rs");
+    stands_nowhere_else(&WRITING, &may, "`files` does that, and follows no link");
+}
+
+#[test]
+fn load_alone_reads() {
+    let reading = ["fs::read(", "read_to_string(", "File::open", "read_to_end(", "io::stdin", " stdin()"];
+    let may = |path: &Path, word: &str| match path.to_str() {
+        Some("src/cli/load.rs" | "src/campaign/files.rs") => true,
+        // These speak a protocol over standard input, whose messages have a limit.
+        Some("src/cli/lsp.rs" | "src/cli/ads/toy.rs") => word.contains("stdin"),
+        Some("src/cli/lsp/transport.rs") => word == "read_to_end(",
+        _ => false,
+    };
+    stands_nowhere_else(&reading, &may, "`load` reads, which refuses pipes, devices and what is too large");
+}
+
+#[test]
+fn one_function_opens_databases() {
+    let may = |path: &Path, word: &str| match path.to_str() {
+        Some("src/campaign/run/sealed.rs") => word != "ATTACH",
+        Some("src/campaign/run/settled.rs") => word == "ATTACH",
+        _ => false,
+    };
+    let opening = ["Connection::open", "ATTACH", "SQLITE_OPEN_URI", "OpenFlags::default"];
+    stands_nowhere_else(&opening, &may, "`sealed::open_file` and `path_of` look at the path first");
+    let text = std::fs::read_to_string(root().join("src/campaign/run/sealed.rs")).expect("it is readable");
+    let text = without_tests(&text);
+    for (word, times) in
+        [("Connection::open_with_flags(", 1), ("Connection::open_in_memory(", 1), ("Connection::open(", 0)]
+    {
+        assert_eq!(text.matches(word).count(), times, "{word}");
+    }
+}
+
+/// A crafted journal made versions of SQLite before this remove files that it names.
+#[test]
+fn the_bundled_sqlite_removes_no_file_that_a_journal_names() {
+    assert!(rusqlite::version_number() >= 3_054_000, "{}", rusqlite::version());
+}
+
+#[test]
+fn what_is_from_outside_is_written_by_the_function_of_its_place() {
+    let may = |path: &Path, word: &str| match path.to_str() {
+        Some("src/cli/output.rs") => word.starts_with("io::"),
+        // They speak a protocol.
+        Some("src/cli/lsp.rs" | "src/cli/ads/toy.rs") => word.starts_with("io::"),
+        Some("src/lang/syntax/parse.rs" | "src/campaign/emit/tree.rs") => word == " Doc { text",
+        // In Markdown a tag is the one thing that is escaped.
+        Some("src/base/outside.rs" | "src/cli/doc.rs") => word == "&lt;",
+        _ => false,
+    };
+    let words = [".display()", "println!", "print!(", "io::stdout", "io::stderr", " Doc { text", "&lt;"];
+    stands_nowhere_else(
+        &words,
+        &may,
+        "`base/outside` has a function for each place, and `cli/output` prints",
+    );
 }
 
 /// A source text up to the tests at its end. A test function elsewhere, or a file of tests that is named, ends nothing.

@@ -32,6 +32,8 @@ use End::{Any, Done, Refused};
 const LINK: &str = "it is a symbolic link";
 /// Words of the error about a link on the way to a place that was named to be read.
 const WAY: &str = "on the way to it is a symbolic link";
+/// Words of the error about a pipe, a device or a folder in the place of a file.
+const REGULAR: &str = "it is no regular file";
 /// Words of the error about a database in another journal mode.
 const WAL: &str = "journal mode WAL";
 /// Words of the errors about a name in a database.
@@ -160,6 +162,45 @@ const ATTACKS: &[Attack] = &[
     linked(&[("run/run.db-journal", "nowhere")], &["run", "--resume", "run"], Any),
     linked(&[("e1/estimate.db", "nowhere")], &["estimate", "--resume", "e1"], Refused(LINK)),
     // A database in the journal mode WAL, in which SQLite writes into `run.db-shm` even to read.
+    // SQLite would take such names for URIs, and make the database elsewhere.
+    linked(&[("sub", "folder")], &["run", "SPACE", "QUICK", "1", "--out", "file:sub"], Done),
+    linked(&[("mode", "folder")], &["run", "SPACE", "QUICK", "1", "--out", "file:mode?mode=memory"], Done),
+    changed(
+        &[("sub", "folder")],
+        |clone| copy(&clone.join("run"), &clone.join("file:sub")),
+        &["run", "--resume", "file:sub"],
+        Done,
+    ),
+    // What lies beside a database.
+    changed(&[], |clone| pipe(&clone.join("run/run.db-journal")), &["report", "run"], Refused(REGULAR)),
+    changed(
+        &[],
+        |clone| pipe(&clone.join("run/run.db-journal")),
+        &["run", "--resume", "run"],
+        Refused(REGULAR),
+    ),
+    changed(&[], |clone| pipe(&clone.join("e1/estimate.db-journal")), MERGE, Refused(REGULAR)),
+    changed(
+        &[],
+        |clone| named_again(clone, "run/run.db-journal"),
+        &["run", "--resume", "run"],
+        Refused("hard link"),
+    ),
+    changed(&[], with_wal, &["run", "--resume", "run"], Refused(WAL)),
+    changed(&[], with_wal, &["report", "run"], Refused(WAL)),
+    // Devices and pipes in the place of files.
+    linked(
+        &[("out/corner_0000.ava", "/dev/zero")],
+        &["export", "--to", "ava", "FOUND", "--out", "out"],
+        Refused("with another content"),
+    ),
+    changed(&[], |clone| pipe(&clone.join("m/estimate.yaml")), MERGE, Refused("is not empty")),
+    changed(
+        &[],
+        |clone| pipe(&clone.join("reused")),
+        &["study", "theirs.yaml", "--dry-run", "--reuse", "reused"],
+        Refused("reused"),
+    ),
     changed(&[], in_wal, &["report", "run"], Refused(WAL)),
     changed(&[], in_wal, &["run", "--resume", "run"], Refused(WAL)),
     changed(&[], in_wal, &["merge", "run", "--out", "m"], Refused(WAL)),
@@ -211,7 +252,7 @@ const ATTACKS: &[Attack] = &[
     changed(&[(FOUND, "mine.ava")], edited_elsewhere, &["test", "--accept", "run"], Any),
     // Merges: links in shards and in the way, and names that databases give.
     linked(&[("m.partial", "folder")], MERGE, Refused(LINK)),
-    linked(&[("m.partial/merge.partial", "mine.txt")], MERGE, Done),
+    linked(&[("m.partial/merge.partial", "mine.txt")], MERGE, Refused(LINK)),
     linked(&[("e2/critical", "folder")], MERGE, Refused(LINK)),
     linked(&[("run/critical/space", "folder")], &["merge", "run", "--out", "m"], Any),
     // The text comes from the sealed database.
@@ -424,7 +465,26 @@ fn in_wal(clone: &Path) {
         database.query_row("PRAGMA journal_mode = WAL", [], |row| row.get(0)).expect("it is writable");
     assert_eq!(mode, "wal");
     drop(database);
-    std::fs::hard_link(clone.with_file_name("mine.txt"), clone.join("run/run.db-shm")).expect("it is free");
+    named_again(clone, "run/run.db-shm");
+}
+
+/// Makes a pipe that nothing writes to.
+fn pipe(path: &Path) {
+    std::fs::create_dir_all(path.parent().expect("it lies in a folder")).expect("it is writable");
+    let name = std::ffi::CString::new(path.to_str().expect("it is text")).expect("it has no zero");
+    // SAFETY: the name is a string with an end.
+    assert_eq!(unsafe { libc::mkfifo(name.as_ptr(), 0o600) }, 0);
+}
+
+/// Gives a file of the user a further name in the clone.
+fn named_again(clone: &Path, name: &str) {
+    std::fs::hard_link(clone.with_file_name("mine.txt"), clone.join(name)).expect("it is free");
+}
+
+/// Puts a journal of the mode WAL beside the run's database, which is in another one. SQLite takes it all the same.
+fn with_wal(clone: &Path) {
+    std::fs::write(clone.join("run/run.db-wal"), "").expect("it is writable");
+    named_again(clone, "run/run.db-shm");
 }
 
 /// Puts a file to import into a folder of the clone.

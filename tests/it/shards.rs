@@ -402,4 +402,22 @@ fn a_space_or_a_policy_that_has_changed_is_refused_before_anything_is_there() {
     let (status, _, stderr) = merge(&away, "again");
     assert_eq!(status, 0, "{stderr}");
     equal(&at("merged"), &at("again"));
+
+    // Two merges into one directory are kept apart, and what a killed one left stands in nobody's way.
+    let partial = at("third.partial");
+    std::fs::create_dir(&partial).expect("it is writable");
+    let mark = std::fs::File::create(partial.join("merge.partial")).expect("it is writable");
+    std::fs::write(partial.join("run.yaml"), "half").expect("it is writable");
+    mark.lock().expect("it is free");
+    let (status, _, stderr) = merge(&away, "third");
+    assert!(status == 1 && stderr.contains("another merge is at work"), "{stderr}");
+    assert_eq!(std::fs::read_to_string(partial.join("run.yaml")).expect("it is left alone"), "half");
+    drop(mark);
+    assert_eq!(merge(&away, "third").0, 0);
+    std::fs::create_dir(at("fourth.partial")).expect("it is writable");
+    assert_eq!(merge(&away, "fourth").0, 0);
+    for name in ["third", "fourth"] {
+        equal(&at("merged"), &at(name));
+        assert!(!at(&format!("{name}.partial")).exists());
+    }
 }

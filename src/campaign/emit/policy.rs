@@ -40,7 +40,7 @@ fn file(policy: &Policy, space: &Space, space_path: &str, digest: String) -> Fil
         rules: policy.rules.iter().map(|rule| line(space, rule)).collect(),
     };
     let headline = "Emitted by `avastra train`; play it with `avastra run --policy FILE`.";
-    let docs = policy.docs.iter().map(tree::doc).collect();
+    let docs = policy.docs.iter().map(|text| tree::doc(text)).collect();
     tree::file(headline, space, space_path, docs, ItemKind::Policy(item))
 }
 

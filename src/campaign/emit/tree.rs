@@ -1,5 +1,6 @@
 //! Small constructors for syntax trees that do not come from text.
 
+use avastra_base::outside::in_comment;
 use avastra_base::units::{Dimension, decimal};
 use avastra_lang::model::{Space, Type, Value};
 use avastra_lang::syntax::LANGUAGE;
@@ -24,8 +25,9 @@ pub fn file(headline: &str, space: &Space, space_path: &str, docs: Vec<Doc>, kin
     }
 }
 
-pub fn doc(text: impl Into<String>) -> Doc {
-    Doc { text: text.into(), span: Span::NONE }
+/// A line of documentation; the text may be from outside.
+pub fn doc(text: &str) -> Doc {
+    Doc { text: in_comment(text), span: Span::NONE }
 }
 
 pub fn name(text: &str) -> Expr {

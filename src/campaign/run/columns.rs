@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
+use rusqlite::OpenFlags;
 use rusqlite::types::ValueRef;
-use rusqlite::{Connection, OpenFlags};
 
 use crate::run::database::LAYOUT;
-use crate::run::sealed::{DatabaseError, check_journal};
+use crate::run::sealed::{DatabaseError, open_file};
 
 /// A column of a table.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,8 +31,7 @@ pub enum Values {
 /// # Errors
 /// If the file cannot be read, has another layout, or has no such table.
 pub fn columns(path: &Path, table: &str) -> Result<Vec<Column>, DatabaseError> {
-    check_journal(path)?;
-    let connection = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
+    let connection = open_file(path, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
     if !LAYOUT.is_in(&connection)? {
         return Err(DatabaseError::Empty);
     }

@@ -4,11 +4,12 @@
 //! The settings stand in the database as they were when it was begun. Every episode (or cell) has a seal: a digest of
 //! these settings and of all its rows, written in the same transaction. So rows that were played with other settings count
 //! as changed. SQLite's own check finds torn pages, a seal finds values that were changed. Neither protects against a
-//! forger who writes seals, too. A file from elsewhere may hold a view in place of a table, which could run for ever when
-//! it is read. So its tables are compared with those of this version before anything is read.
+//! forger who writes seals, too. A file from elsewhere may hold a view in place of a table, or a condition on its rows, which
+//! could run for ever when it is read or checked. So what it declares must be, to the letter, what this version declares, before
+//! anything is read.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, OpenFlags, OptionalExtension, Row, ToSql, params};
@@ -17,6 +18,7 @@ use sha2::{Digest, Sha256};
 
 use crate::files;
 use crate::files::NotPlain;
+use avastra_base::outside::{Shown, in_line};
 use avastra_lang::model::digest_text;
 
 /// Tables that every layout has.
@@ -62,6 +64,8 @@ pub enum DatabaseError {
          if it is your own, `sqlite3 FILE 'PRAGMA journal_mode = DELETE'` takes it back"
     )]
     Journal,
+    #[error("`{}` beside it: {error}", path.shown())]
+    Beside { path: PathBuf, error: std::io::Error },
     #[error(transparent)]
     File(#[from] std::io::Error),
     #[error(transparent)]
@@ -150,17 +154,12 @@ impl Layout {
         settings: &str,
         if_empty: IfEmpty,
     ) -> Result<(Connection, Vec<i64>), DatabaseError> {
-        // SQLite would follow a link and write where it leads.
-        files::own_file(path)?;
-        check_journal(path)?;
-        let mut connection = match if_empty {
-            IfEmpty::Begin => Connection::open(path)?,
+        let flags = match if_empty {
+            IfEmpty::Begin => OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE,
             // Not read-only: SQLite must be able to undo what a kill left half written. No file is made.
-            IfEmpty::Refuse => {
-                let existing = OpenFlags::default().difference(OpenFlags::SQLITE_OPEN_CREATE);
-                Connection::open_with_flags(path, existing)?
-            }
+            IfEmpty::Refuse => OpenFlags::SQLITE_OPEN_READ_WRITE,
         };
+        let mut connection = open_file(path, flags)?;
         match (self.is_in(&connection)?, if_empty) {
             (true, _) => {
                 self.check_tables(&connection)?;
@@ -200,12 +199,12 @@ impl Layout {
         }
     }
 
-    /// Refuses a file unless its tables are those of this layout, see [`check_plain`].
+    /// Refuses a file unless it declares what this layout declares, see [`check_declared`].
     pub(super) fn check_tables(&self, connection: &Connection) -> Result<(), DatabaseError> {
         let pattern = Connection::open_in_memory()?;
         pattern.execute_batch(TABLES)?;
         pattern.execute_batch(&(self.schema)())?;
-        check_plain(connection, "main", &plain_tables(&pattern, "main")?)
+        check_declared(connection, "main", &declared(&pattern, "main")?)
     }
 
     /// Checks that its pages are sound and its settings those that it was begun with.
@@ -231,18 +230,23 @@ impl Layout {
             let query = format!("SELECT {unit} FROM {table} WHERE ({condition}) IS NOT TRUE");
             unsound.extend(query_all(connection, &query, |row| row.get::<_, i64>(0))?);
         }
-        let of_tables: String =
-            self.tables.iter().map(|table| format!("SELECT {unit} FROM {table} UNION ")).collect();
-        let numbers = format!("{of_tables}SELECT unit FROM seal ORDER BY 1");
+        let mut held = BTreeSet::new();
+        for table in self.tables {
+            let query = format!("SELECT DISTINCT {unit} FROM {table}");
+            held.extend(query_all(connection, &query, |row| row.get::<_, i64>(0))?);
+        }
+        let sealed = query_all(connection, "SELECT unit FROM seal", |row| row.get::<_, i64>(0))?;
         let settings = settings_digest(connection)?;
-        let mut damaged = Vec::new();
-        for number in query_all(connection, &numbers, |row| row.get::<_, i64>(0))? {
+        // A seal of nothing is cheap to forge: such units cost no query.
+        let mut damaged: Vec<i64> = sealed.into_iter().filter(|number| !held.contains(number)).collect();
+        for number in held {
             let mut seal = connection.prepare_cached("SELECT digest FROM seal WHERE unit = ?")?;
             let seal: Option<String> = seal.query_row([number], |row| row.get(0)).optional()?;
             if unsound.contains(&number) || seal != Some(self.digest(connection, &settings, number)?) {
                 damaged.push(number);
             }
         }
+        damaged.sort_unstable();
         Ok(damaged)
     }
 
@@ -330,12 +334,45 @@ pub(crate) fn settings_digest(connection: &Connection) -> Result<[u8; 32], rusql
     Ok(Sha256::digest(settings.as_bytes()).into())
 }
 
+/// Opens a file of SQLite. Every file is opened here, or attached by [`path_of`]; `tests/it/layers.rs` keeps it so.
+///
+/// # Errors
+/// If SQLite cannot open it, or as [`path_of`].
+pub(super) fn open_file(path: &Path, flags: OpenFlags) -> Result<Connection, DatabaseError> {
+    let path = path_of(path)?;
+    Ok(Connection::open_with_flags(path, flags | OpenFlags::SQLITE_OPEN_NO_MUTEX)?)
+}
+
+/// The path of a database as SQLite is to be given it.
+///
+/// # Errors
+/// If it, or what SQLite would read or write beside it, is no file of its own: SQLite follows links and waits for pipes. If it is
+/// in the journal mode WAL.
+pub(super) fn path_of(path: &Path) -> Result<PathBuf, DatabaseError> {
+    let beside = |ending: &str| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(ending);
+        PathBuf::from(name)
+    };
+    files::own_file(path)?;
+    let journal = beside("-journal");
+    let named = |error| DatabaseError::Beside { path: journal.clone(), error };
+    files::own_file(&journal).and_then(|()| files::without_further_names(&journal)).map_err(named)?;
+    // Whatever the head says, SQLite takes such a file for the journal, and writes into `FILE-shm`.
+    if beside("-wal").symlink_metadata().is_ok() {
+        return Err(DatabaseError::Journal);
+    }
+    check_journal(path)?;
+    // SQLite takes a name that begins with `file:` for a URI, whatever the flags: it is built so.
+    Ok(Path::new(".").join(path))
+}
+
 /// What every file of SQLite begins with.
 const MAGIC: &[u8] = b"SQLite format 3\0";
 
 /// Refuses a file in the journal mode WAL. In that mode, whoever opens the file writes into `FILE-shm`, which may be a further name
 /// of a file of the user.
-pub(super) fn check_journal(path: &Path) -> Result<(), DatabaseError> {
+fn check_journal(path: &Path) -> Result<(), DatabaseError> {
     let head = files::first_bytes(path, 20)?;
     // The versions that writing and reading need: 1 with a rollback journal, 2 with WAL.
     match head.strip_prefix(MAGIC) {
@@ -344,64 +381,33 @@ pub(super) fn check_journal(path: &Path) -> Result<(), DatabaseError> {
     }
 }
 
-/// The columns of a table: name, type, and position in the key, which is 0 for a column outside the key.
-type Columns = Vec<(String, String, i64)>;
+/// What a file declares: the name and the kind of each table and index, the table that it belongs to, and its text.
+type Declared = Vec<(String, String, String, Option<String>)>;
 
-/// Refuses an attached file unless it holds only plain tables, among them the wanted ones with their columns and keys. Keys
-/// matter, because without them every search for a unit would go through all rows.
-pub(super) fn check_plain(
-    connection: &Connection,
-    file: &str,
-    wanted: &BTreeMap<String, Columns>,
-) -> Result<(), DatabaseError> {
-    let found = plain_tables(connection, file)?;
-    let is_there = |name: &str, columns: &Columns| {
-        found.get(name).is_some_and(|there| columns.iter().all(|column| there.contains(column)))
-    };
-    match wanted.iter().find(|(name, columns)| !is_there(name, columns)) {
-        None => Ok(()),
-        Some((name, _)) => {
-            Err(DatabaseError::Damaged { what: format!("`{name}` is not there or has other columns") })
-        }
-    }
+/// What an attached file declares, sorted.
+pub(super) fn declared(connection: &Connection, file: &str) -> Result<Declared, DatabaseError> {
+    let query = format!("SELECT name, type, tbl_name, sql FROM {file}.sqlite_schema ORDER BY 1, 2, 3, 4");
+    query_all(connection, &query, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?)))
 }
 
-/// The tables of an attached file.
-///
-/// # Errors
-/// If it holds anything else: a view, a trigger, a virtual table, a further index or a computed column. Reading these would run
-/// code from the file.
-pub(super) fn plain_tables(
+/// Refuses an attached file unless it declares what is wanted, to the letter. A view, a trigger, a computed column, an index or a
+/// condition of another would be evaluated when the file is read or checked.
+pub(super) fn check_declared(
     connection: &Connection,
     file: &str,
-) -> Result<BTreeMap<String, Columns>, DatabaseError> {
-    let strange =
-        |name: &str| DatabaseError::Damaged { what: format!("`{name}` is no table that avastra makes") };
-    let schema =
-        query_all(connection, &format!("SELECT type, name, sql FROM {file}.sqlite_schema"), |row| {
-            Ok((row.get::<_, String>(0)?, row.get::<_, String>(1)?, row.get::<_, Option<String>>(2)?))
-        })?;
-    let mut tables = BTreeMap::new();
-    for (kind, name, sql) in schema {
-        match (kind.as_str(), sql) {
-            // SQLite normalises the beginning of the stored text to these words.
-            ("table", Some(sql)) if sql.starts_with("CREATE TABLE ") => {}
-            // The index of a key has no text.
-            ("index", None) => continue,
-            _ => return Err(strange(&name)),
-        }
-        let (mut columns, mut is_plain) = (Columns::new(), true);
-        connection.pragma(Some(file), "table_xinfo", name.as_str(), |row| {
-            columns.push((row.get("name")?, row.get("type")?, row.get("pk")?));
-            is_plain &= row.get::<_, i64>("hidden")? == 0;
-            Ok(())
-        })?;
-        if !is_plain {
-            return Err(strange(&name));
-        }
-        tables.insert(name, columns);
-    }
-    Ok(tables)
+    wanted: &Declared,
+) -> Result<(), DatabaseError> {
+    let found = declared(connection, file)?;
+    let what = match (
+        found.iter().find(|one| !wanted.contains(one)),
+        wanted.iter().find(|one| !found.contains(one)),
+    ) {
+        (Some((name, ..)), _) => format!("`{}` is no table that avastra makes", in_line(name)),
+        (None, Some((name, ..))) => format!("`{name}` is not there"),
+        (None, None) if found.len() > wanted.len() => "a table is declared twice".to_owned(),
+        (None, None) => return Ok(()),
+    };
+    Err(DatabaseError::Damaged { what })
 }
 
 /// Adds a row with a value for each column of a table.
@@ -609,8 +615,11 @@ mod tests {
     fn only_tables_that_avastra_makes_are_read() {
         let endless =
             "WITH RECURSIVE n(reason, text) AS (SELECT 1, 'a' UNION ALL SELECT reason + 1, 'a' FROM n)";
-        let view = format!(
-            "ALTER TABLE reason RENAME TO other; CREATE VIEW reason AS {endless} SELECT reason, text FROM n"
+        let view = format!("DROP TABLE reason; CREATE VIEW reason AS {endless} SELECT reason, text FROM n");
+        let slow = "CHECK (length(hex(zeroblob(100000000))) > 0)";
+        let endless_check = format!(
+            "CREATE TABLE other AS SELECT * FROM begun; DROP TABLE begun; CREATE TABLE begun (only INTEGER PRIMARY KEY CHECK \
+             (only = 1), settings TEXT NOT NULL {slow}) STRICT; INSERT INTO begun SELECT * FROM other; DROP TABLE other"
         );
         let changes = [
             (view.as_str(), "`reason` is no table"),
@@ -620,10 +629,13 @@ mod tests {
             ("CREATE VIRTUAL TABLE places USING rtree(id, a, b)", "`places` is no table"),
             ("ALTER TABLE reason ADD COLUMN more TEXT AS (hex(text))", "`reason` is no table"),
             ("DROP TABLE reason", "`reason` is not there"),
-            ("ALTER TABLE step DROP COLUMN x", "`step` is not there or has other columns"),
+            ("ALTER TABLE step DROP COLUMN x", "`step` is no table"),
+            ("CREATE TABLE more (x, CHECK (x > 0))", "`more` is no table"),
+            (endless_check.as_str(), "`begun` is no table"),
+            ("CREATE TABLE more (x COLLATE nocase DEFAULT (hex(1)))", "`more` is no table"),
             (
                 "DROP TABLE seal; CREATE TABLE seal (unit INTEGER, digest TEXT NOT NULL) STRICT",
-                "`seal` is not there or has other columns",
+                "`seal` is no table",
             ),
         ];
         for (change, what) in changes {

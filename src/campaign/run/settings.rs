@@ -86,7 +86,7 @@ impl RunSettings {
         RunSettings {
             avastra: VERSION.to_owned(),
             engine: ENGINE.to_owned(),
-            space: space.path.display().to_string(),
+            space: space.path.to_string_lossy().into_owned(),
             space_digest: space.meaning.seal(),
             roads: space.roads.iter().map(|road| road.name.clone()).collect(),
             ads: DEFAULT_ADS.to_owned(),

@@ -8,11 +8,13 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use rusqlite::{Connection, params};
+use rusqlite::{Connection, OpenFlags, params};
 use sha2::{Digest, Sha256};
 
 use crate::files::{PlainName, Temporary};
-use crate::run::sealed::{DatabaseError, IfEmpty, Layout, add_rows, check_plain, plain_tables, query_all};
+use crate::run::sealed::{
+    DatabaseError, IfEmpty, Layout, add_rows, check_declared, declared, open_file, path_of, query_all,
+};
 
 /// A unit to take over: its number in the other file, and the number that it gets here.
 pub type Numbered = (i64, i64);
@@ -136,7 +138,7 @@ pub trait Units: Sized {
         Self::LAYOUT.take(settled.connection(), path, units, &take_apart(Self::LAYOUT))?;
         drop(settled);
         temporary.take_place_of(path)?;
-        Ok(Self::from_connection(Connection::open(path)?))
+        Ok(Self::from_connection(open_file(path, OpenFlags::SQLITE_OPEN_READ_WRITE)?))
     }
 }
 
@@ -168,11 +170,10 @@ impl Layout {
         units: &[Numbered],
         adjust: &dyn Fn(&Connection) -> Result<(), rusqlite::Error>,
     ) -> Result<(), DatabaseError> {
-        // Not made absolute: the folder that one works in may have a name that is no text. A name alone may look like a URI.
-        let other = Path::new(".").join(other);
-        connection.execute("ATTACH DATABASE ? AS other", [other.to_string_lossy()])?;
-        let taken = plain_tables(connection, "main")
-            .and_then(|wanted| check_plain(connection, "other", &wanted))
+        // Not made absolute: the folder that one works in may have a name that is no text.
+        connection.execute("ATTACH DATABASE ? AS other", [path_of(other)?.to_string_lossy()])?;
+        let taken = declared(connection, "main")
+            .and_then(|wanted| check_declared(connection, "other", &wanted))
             .and_then(|()| self.take_attached(connection, units, adjust));
         // Without a transaction under way, detaching cannot fail for a reason of its own.
         let detached = connection.execute_batch("DETACH DATABASE other");

@@ -147,7 +147,7 @@ impl StudySettings {
             avastra: VERSION.to_owned(),
             engine: ENGINE.to_owned(),
             question: file.question,
-            space: space.path.display().to_string(),
+            space: space.path.to_string_lossy().into_owned(),
             space_digest: space.meaning.seal(),
             roads,
             ads: if external.is_some() { EXTERNAL.to_owned() } else { file.ads },

@@ -12,6 +12,7 @@ use crate::episode;
 use crate::episode::{Choice, EpisodeLog};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
+use avastra_base::threads::in_order;
 use avastra_drivers::Ads;
 use avastra_lang::model::Row;
 use avastra_lang::model::command::Command;
@@ -31,6 +32,9 @@ pub struct TrialSettings {
     pub tries: u32,
     pub seed: u64,
 }
+
+/// Roads that are tried at the same time.
+const ROADS_AT_ONCE: usize = 64;
 
 /// What the trials say of a row on a road.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -111,13 +115,10 @@ impl<'a> Trials<'a> {
         Trials { arena, settings }
     }
 
-    /// All cells, by row and then by road; each road is tried on a thread of its own. `judged` is called after each.
+    /// All cells, by row and then by road; some roads are tried at the same time. `judged` is called after each.
     pub fn cells(&self, judged: &(dyn Fn() + Sync)) -> Vec<Cell> {
-        let by_road: Vec<Vec<Cell>> = std::thread::scope(|scope| {
-            let roads = 0..self.arena.roads();
-            let workers: Vec<_> = roads.map(|road| scope.spawn(move || self.road(road, judged))).collect();
-            workers.into_iter().map(|worker| worker.join().expect("no trial panics")).collect()
-        });
+        let roads: Vec<usize> = (0..self.arena.roads()).collect();
+        let by_road = in_order(&roads, ROADS_AT_ONCE, |&road| self.road(road, judged));
         let rows = 0..self.arena.table().rows().len();
         rows.flat_map(|row| by_road.iter().map(move |cells| cells[row].clone())).collect()
     }

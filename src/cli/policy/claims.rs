@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::cli::error::Failure;
 use crate::cli::output::{Output, plural};
+use avastra_base::outside::Shown;
 use avastra_campaign::train::{evaluate, judge_rules, rounded, training_arena};
 use avastra_lang::model::policy::RulesClaims;
 use avastra_lang::model::{Policy, digest_text};
@@ -61,15 +62,15 @@ fn figures(claims: &RulesClaims) -> [(&'static str, String); 8] {
 /// Says whether a policy holds what it claims.
 pub fn report(output: &Output, path: &Path, policy: &Policy, wrong: &[String]) {
     match (&policy.claims, wrong) {
-        (None, _) => output.say(&format!("{}: {} makes no claim", path.display(), policy.name)),
+        (None, _) => output.say(&format!("{}: {} makes no claim", path.shown(), policy.name)),
         (Some(claims), []) => {
             let episodes = claims.episodes as usize * policy.origin.roads.len();
             let text = plural(episodes, "episode");
             let faces = if claims.rules.is_some() { " by each of its faces" } else { "" };
-            output.tell(&format!("{}: {} holds, {text} played again{faces}", path.display(), policy.name));
+            output.tell(&format!("{}: {} holds, {text} played again{faces}", path.shown(), policy.name));
         }
         (Some(_), wrong) => {
-            output.say(&format!("{}: {} is refuted", path.display(), policy.name));
+            output.say(&format!("{}: {} is refuted", path.shown(), policy.name));
             wrong.iter().for_each(|line| output.say(&format!("  {line}")));
         }
     }

@@ -9,6 +9,7 @@ use crate::cli::files::{place, write_result};
 use crate::cli::load;
 use crate::cli::output::{Output, plural};
 use crate::cli::progress::Working;
+use avastra_base::outside::Shown;
 use avastra_campaign::emit;
 use avastra_campaign::run::Arena;
 use avastra_campaign::train;
@@ -29,7 +30,7 @@ pub fn distil(output: &Output, arguments: &DistilArguments) -> Result<(), Failur
         }
     }
     if policy.claims.is_none() {
-        let path = arguments.file.display();
+        let path = arguments.file.shown();
         return Err(Failure::usage(format!("`{path}` makes no claims: train it with `avastra train`")));
     }
     let acting = acting(&table, &policy, Face::Network)?;
@@ -48,7 +49,7 @@ pub fn distil(output: &Output, arguments: &DistilArguments) -> Result<(), Failur
     if let Some((claims, rules)) = claims.and_then(|claims| Some((claims, claims.rules.as_ref()?))) {
         output.say(&rules_text(policy.rules.len(), claims.return_mean, rules));
     }
-    output.say(&path.display().to_string());
+    output.say(&path.shown().to_string());
     let rules = claims.map(|claims| &claims.rules);
     output.result(serde_json::json!({ "policy": path, "lines": policy.rules.len(), "rules": rules }));
     Ok(())

@@ -5,6 +5,7 @@ use crate::cli::error::Failure;
 use crate::cli::files::{place, write_result};
 use crate::cli::load;
 use crate::cli::output::Output;
+use avastra_base::outside::Shown;
 use avastra_campaign::emit;
 use avastra_search::agent::Face;
 
@@ -19,7 +20,7 @@ pub fn weights(output: &Output, arguments: &WeightsArguments) -> Result<(), Fail
     let (shape, count) = (acting.network().shape(), acting.network().parameters().len());
     let widths: Vec<String> = shape.layers.iter().map(ToString::to_string).collect();
     let head = if shape.dueling { ", and the state's value as the last output" } else { "" };
-    output.say(&format!("{}: {count} numbers of {}{head}", path.display(), widths.join("-")));
+    output.say(&format!("{}: {count} numbers of {}{head}", path.shown(), widths.join("-")));
     output.result(serde_json::json!({ "file": path, "layers": shape.layers, "dueling": shape.dueling }));
     Ok(())
 }

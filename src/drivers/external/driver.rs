@@ -11,9 +11,10 @@ use crate::driver::Ads;
 use crate::modular::{Modular, ModularConfig};
 use crate::status::{PerceivedObject, Reason, Status};
 use avastra_base::geometry::{Pose, Vec2};
+use avastra_base::outside::in_line;
 use avastra_world::sim::{Control, DT_S, Scene, Sensed};
 
-use super::finding::{Failure, FailureKind, Problem, harmless};
+use super::finding::{Failure, FailureKind, Problem};
 use super::follow::Follower;
 use super::message::{Answer, Event, Observation, Question};
 use super::program::{MapLine, Program};
@@ -246,7 +247,7 @@ impl External {
         }
         self.status.reason = Reason::Reported;
         let reason = internal.and_then(|internal| internal.reason.as_deref());
-        self.status.reported = reason.map(|reason| harmless(reason).into());
+        self.status.reported = reason.map(|reason| in_line(reason).into());
         if let Some(at) = internal.and_then(|internal| internal.localized.as_ref()) {
             self.status.localized = Some(Pose { position: Vec2::new(at.x, at.y), heading_rad: at.heading });
         }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use avastra_lang::syntax::acts_on_terminal;
+use avastra_base::outside::{acts_on_terminal, in_line};
 
 use super::words::words;
 
@@ -92,7 +92,7 @@ pub struct Failure {
 
 impl Failure {
     pub fn new(problem: Problem, stage: impl Into<String>, detail: impl Into<String>) -> Failure {
-        let detail = harmless(&detail.into());
+        let detail = in_line(&detail.into()).into_owned();
         Failure { problem, stage: stage.into(), detail, exit: None, stderr: String::new() }
     }
 
@@ -102,28 +102,30 @@ impl Failure {
 
     /// In one line, for example `ads_crash (exited) at step 37: it ended with exit status 1`.
     pub fn in_words(&self) -> String {
-        format!("{} ({}) at {}: {}", self.kind().name(), self.problem.name(), self.stage, self.what())
+        let stage = in_line(&self.stage);
+        format!("{} ({}) at {stage}: {}", self.kind().name(), self.problem.name(), self.what())
     }
 
     /// What happened, and how the process ended.
     pub fn what(&self) -> String {
         let exit = self.exit.as_ref().map_or(String::new(), |exit| format!("; it ended with {exit}"));
-        format!("{}{exit}", self.detail)
+        // It may be read from a file that another program wrote.
+        in_line(&format!("{}{exit}", self.detail)).into_owned()
     }
 
     /// The last lines of its standard error, at most so many, each cut to a length that can be read.
     pub fn stderr_lines(&self, at_most: usize) -> Vec<String> {
         let lines: Vec<&str> = self.stderr.lines().collect();
         let short = |line: &&str| match line.char_indices().nth(STDERR_CHARS_SHOWN) {
-            Some((end, _)) => format!("{}…", &line[..end]),
-            None => (*line).to_owned(),
+            Some((end, _)) => format!("{}…", in_line(&line[..end])),
+            None => in_line(line).into_owned(),
         };
         lines[lines.len().saturating_sub(at_most)..].iter().map(short).collect()
     }
 }
 
-/// Text of a program as it is kept in logs, databases and files, which may be printed by other programs, too: characters
-/// that would act on a terminal become U+FFFD, and a carriage return before a line feed is left out.
+/// Lines of a program as they are kept in files, which other programs may print, too: characters that would act on a terminal
+/// become U+FFFD, and a carriage return before a line feed is left out.
 pub(super) fn harmless(text: &str) -> String {
     text.replace("\r\n", "\n").replace(acts_on_terminal, "\u{fffd}")
 }
@@ -135,7 +137,19 @@ mod tests {
     #[test]
     fn what_a_program_says_cannot_steer_a_terminal() {
         let failure = Failure::new(Problem::Reported, "step 1", "lost \u{1b}[2J\u{202e}\r\n\there\u{7}");
-        assert_eq!(failure.detail, "lost \u{fffd}[2J\u{fffd}\n\there\u{fffd}");
+        assert_eq!(failure.detail, r"lost \u{1b}[2J\u{202e}\r\n\there\u{7}");
+        assert_eq!(harmless("lost \u{1b}[2J\r\n\there"), "lost \u{fffd}[2J\n\there");
+    }
+
+    #[test]
+    fn what_a_file_says_of_a_failure_stays_in_one_line() {
+        let lines = "x\n::error::forged\u{2028}y".to_owned();
+        let stderr = format!("##vso[task]\n{lines}");
+        let (stage, detail, exit) = (lines.clone(), lines.clone(), Some(lines));
+        let failure = Failure { problem: Problem::Reported, stage, detail, exit, stderr };
+        assert_eq!(failure.in_words().lines().count(), 1, "{}", failure.in_words());
+        let lines = [r"\u{23}#vso[task]", "x", r"\u{3a}:error::forged\u{2028}y"];
+        assert_eq!(failure.stderr_lines(3), lines);
     }
 
     const PROTOCOL: &str = include_str!("../../../PROTOCOL.md");

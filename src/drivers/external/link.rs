@@ -20,6 +20,8 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::sys::signal::{Signal, killpg};
 use nix::unistd::Pid;
 
+use avastra_base::outside::Shown;
+
 use super::finding::{Problem, harmless};
 use super::settings::{ExternalSettings, Target};
 
@@ -142,7 +144,7 @@ impl Link {
                     None => path.clone(),
                 };
                 let socket = UnixStream::connect(&path)
-                    .map_err(|error| format!("nothing answers at `{}`: {error}", path.display()))?;
+                    .map_err(|error| format!("nothing answers at `{}`: {error}", path.shown()))?;
                 socket.set_nonblocking(true).map_err(|error| error.to_string())?;
                 Ends::Unix(socket)
             }
@@ -423,7 +425,7 @@ fn start(words: &[String], settings: &ExternalSettings) -> Result<Ends, String> 
     command.envs(&settings.env).process_group(0);
     if let Some(directory) = &settings.working_directory {
         if !directory.is_dir() {
-            return Err(format!("its working directory `{}` is no folder", directory.display()));
+            return Err(format!("its working directory `{}` is no folder", directory.shown()));
         }
         command.current_dir(directory);
     }

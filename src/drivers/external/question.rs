@@ -89,7 +89,7 @@ pub fn map(map: &RoadMap, opendrive: Option<&Path>) -> Map {
     });
     Map {
         id: map.name.clone(),
-        opendrive: opendrive.map(|path| path.display().to_string()),
+        opendrive: opendrive.map(|path| path.to_string_lossy().into_owned()),
         lanes: lanes.collect(),
         signals: signals.collect(),
         crosswalks: each(&map.crosswalks, |crosswalk| CrosswalkMessage {

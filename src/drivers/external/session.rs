@@ -1,8 +1,9 @@
 //! One driving system that was started, spoken with in whole messages: asks, waits, reads and judges the answer.
 
+use avastra_base::outside::in_line;
 use serde_json::Value;
 
-use super::finding::{Failure, Problem, harmless};
+use super::finding::{Failure, Problem};
 use super::link::{Broken, Deadline, Link};
 use super::message::{Answer, AnswerKind, Close, ERROR_CHARS_MAX, Init, PROTOCOL, Question, Ready};
 use super::schema::Schema;
@@ -28,7 +29,7 @@ pub struct Identity {
 impl Identity {
     /// Its name and version.
     pub fn text(&self) -> String {
-        format!("{} {}", self.name, self.version)
+        in_line(&format!("{} {}", self.name, self.version)).into_owned()
     }
 }
 
@@ -301,7 +302,7 @@ fn identity(ready: Ready, init: &Init) -> Result<Identity, Broken> {
     }
     let (name, version) =
         (ready.name.ok_or_else(|| missing("name"))?, ready.version.ok_or_else(|| missing("version"))?);
-    if [&name, &version].into_iter().any(|text| *text != harmless(text) || text.contains(['\n', '\t'])) {
+    if [&name, &version].into_iter().any(|text| *text != in_line(text)) {
         let detail = "`name` and `version` have no control characters".to_owned();
         return Err(Broken { problem: Problem::WrongShape, detail });
     }

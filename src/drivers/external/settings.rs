@@ -163,7 +163,7 @@ impl Target {
                 words.collect::<Vec<_>>().join(" ")
             }
             Target::Tcp(address) => format!("tcp:{address}"),
-            Target::Unix(path) => format!("unix:{}", path.display()),
+            Target::Unix(path) => format!("unix:{}", path.to_string_lossy()),
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
+use avastra_base::outside::in_comment;
 use avastra_campaign::emit::quoted;
 use avastra_lang::model::vocabulary::{Body, BodyClass, Word};
 use avastra_lang::syntax::ast::FileId;
@@ -72,27 +73,16 @@ pub fn own(own: &Own, name: &str, notes: BTreeSet<String>) -> Imported {
 
 /// How a file begins: what it is, what differs, and the version of the language.
 fn head(description: &str, name: &str, notes: &BTreeSet<String>) -> String {
-    let description = one_line(description);
+    let description = in_comment(description);
     let title = if description.is_empty() { name.to_owned() } else { description };
     let mut text = format!(
         "//! {title}\n//!\n//! From OpenSCENARIO XML by `avastra import`. What differs from the file:\n"
     );
     for note in notes {
-        let _ = writeln!(text, "//! - {}", one_line(note));
+        let _ = writeln!(text, "//! - {}", in_comment(note));
     }
     text += "language 1\n\n";
     text
-}
-
-fn is_invisible(letter: char) -> bool {
-    letter.is_control() && !letter.is_whitespace()
-        || matches!(letter, '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
-}
-
-fn one_line(text: &str) -> String {
-    // Signs that change how a line looks have no place in a comment.
-    let plain: String = text.chars().filter(|letter| !is_invisible(*letter)).collect();
-    plain.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Where the ego vehicle begins and arrives: the map, the two places, its speed and the limit.

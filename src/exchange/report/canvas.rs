@@ -5,6 +5,7 @@
 use std::fmt::Write;
 
 use avastra_base::geometry::{Pose, Vec2};
+use avastra_base::outside::in_markup;
 use avastra_road::{Lane, Strip};
 
 /// Distance of the samples along a curved outline, m.
@@ -113,12 +114,7 @@ pub fn thinned(points: &[Vec2]) -> Vec<Vec2> {
 
 /// Text at a pixel.
 pub fn write_text(svg: &mut String, (x, y): (f64, f64), style: &str, text: &str) {
-    let _ = writeln!(svg, r##"<text x="{x:.1}" y="{y:.1}" {style}>{}</text>"##, escape(text));
-}
-
-/// Text as SVG has to write it.
-pub fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+    let _ = writeln!(svg, r##"<text x="{x:.1}" y="{y:.1}" {style}>{}</text>"##, in_markup(text));
 }
 
 #[cfg(test)]

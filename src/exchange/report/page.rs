@@ -9,10 +9,10 @@ use std::fmt::Write;
 
 use serde_json::{Value, json};
 
+use avastra_base::outside::in_markup;
 use avastra_campaign::run::VERSION;
 use avastra_world::sim::ENGINE;
 
-use super::canvas::escape;
 use super::recording::{Recording, quantisation};
 
 const FRAME: &str = include_str!("page/page.html");
@@ -107,7 +107,7 @@ impl Page {
         });
         // What stands in the data must not end the element that holds it.
         let index = index.to_string().replace('<', "\\u003c");
-        let (title, script) = (escape(&self.title), script());
+        let (title, script) = (in_markup(&self.title), script());
         // Each part is looked for in the frame alone, whatever the others hold.
         let mut html = String::new();
         let mut parts = FRAME.split("{{");

@@ -10,12 +10,13 @@ use std::fmt::Write;
 
 use avastra_base::geometry::{Bounds, OrientedBox, Vec2};
 use avastra_base::kinematics::STANDING_MPS;
+use avastra_base::outside::in_markup;
 use avastra_drivers::{PerceivedObject, Status};
 use avastra_lang::model::vocabulary::{Body, Word};
 use avastra_road::{Lane, StripKind};
 use avastra_world::sim::{Contact, Obstacle, SignalColour, World};
 
-use super::canvas::{Canvas, escape, lane_edge, lane_outline, strip_outline, thinned, write_text};
+use super::canvas::{Canvas, lane_edge, lane_outline, strip_outline, thinned, write_text};
 use super::labels::Labels;
 use super::words;
 
@@ -66,7 +67,7 @@ pub fn picture(moments: &[Snapshot], subject: &Subject) -> String {
     let width_px = PANEL_PX * columns as f64;
     let height_px = TITLE_PX + (PANEL_PX + CAPTION_PX) * rows as f64 + LEGEND_PX;
     let mut svg = String::new();
-    let title = escape(&subject.title);
+    let title = in_markup(&subject.title);
     let _ = writeln!(
         svg,
         r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width_px}" height="{height_px}" viewBox="0 0 {width_px} {height_px}" font-family="sans-serif" role="img">

@@ -7,9 +7,10 @@
 use std::fmt::Write;
 
 use avastra_base::geometry::{Bounds, Path, Vec2};
+use avastra_base::outside::in_markup;
 use avastra_road::{Lane, LaneIndex, Neighbour, RoadMap, Route};
 
-use super::canvas::{Canvas, escape, lane_edge, lane_outline};
+use super::canvas::{Canvas, lane_edge, lane_outline};
 
 /// The longer edge of the picture, px.
 const LONGER_PX: f64 = 1600.0;
@@ -71,7 +72,7 @@ impl Drawing<'_> {
     fn warnings(&mut self) {
         for (index, position) in &self.map.warned_at {
             let (x, y) = self.canvas.at(*position);
-            let title = escape(&self.map.warnings[*index]);
+            let title = in_markup(&self.map.warnings[*index]);
             let _ = writeln!(
                 self.canvas.svg,
                 r##"<circle cx="{x:.1}" cy="{y:.1}" r="9" fill="none" stroke="#d50000" stroke-width="2"><title>{title}</title></circle>"##
@@ -107,7 +108,7 @@ impl Drawing<'_> {
                     lane.centre.length_m(),
                     lane.speed_limit_mps
                 );
-                let _ = write!(self.canvas.svg, "<g><title>{}</title>", escape(&title));
+                let _ = write!(self.canvas.svg, "<g><title>{}</title>", in_markup(&title));
                 self.canvas.polygon(&points, &format!(r##"fill="{fill}""##));
                 self.canvas.svg.push_str("</g>\n");
             }
@@ -210,7 +211,7 @@ impl Drawing<'_> {
             let _ = writeln!(
                 self.canvas.svg,
                 r##"<g><title>{}</title><circle cx="{x:.1}" cy="{y:.1}" r="5" fill="{paint}"/><text x="{x:.1}" y="{:.1}" font-size="8" fill="#ffffff" text-anchor="middle">{}</text></g>"##,
-                escape(&signal.id),
+                in_markup(&signal.id),
                 y + 3.0,
                 signal.group
             );

@@ -16,6 +16,8 @@ use crate::model::scenario::Scenario;
 use crate::model::{Meaning, Space, code, digest};
 use crate::syntax::ast::{FileId, ItemKind, Span};
 use crate::syntax::{Diagnostic, Severity, Sources, TOKENS_MAX, ast, parse};
+use avastra_base::outside::Shown;
+use avastra_base::threads::in_order;
 use avastra_road::{LanePlace, RoadError, RoadMap, Route};
 
 /// Why a file cannot be read, in a few words: `no such file`, `a directory`, `not text`.
@@ -89,6 +91,36 @@ pub struct MapCache {
     routes: Vec<(Arc<RoadMap>, [LanePlace; 2], Route)>,
 }
 
+/// Spaces that scenarios and policies used before, for a caller that loads many of them: each space is read and checked once. As
+/// long as this lives, only the files that are loaded themselves may change.
+#[derive(Debug, Default)]
+pub struct KnownSpaces {
+    maps: MapCache,
+    /// The files that others use, by their paths and their places in the order of reading.
+    files: KnownFiles,
+    /// By the files that are read beside the scenario: their places in the order of reading are those in spans.
+    spaces: BTreeMap<Vec<PathBuf>, KnownSpace>,
+}
+
+type KnownFiles = BTreeMap<(usize, PathBuf), KnownFile>;
+
+/// A file as it was read and parsed.
+#[derive(Debug, Clone)]
+struct KnownFile {
+    text: String,
+    tree: ast::File,
+    diagnostics: Vec<Diagnostic>,
+}
+
+/// What the files of a space give, whatever scenario or policy uses it.
+#[derive(Debug, Clone)]
+struct KnownSpace {
+    space: Option<Arc<Space>>,
+    diagnostics: Vec<Diagnostic>,
+    references: References,
+    meanings: BTreeMap<PathBuf, Option<Meaning>>,
+}
+
 /// Maps that are parsed at the same time.
 const MAPS_AT_ONCE: usize = 4;
 
@@ -108,30 +140,79 @@ pub fn load(root: &Path, read: &ReadFile<'_>) -> Result<Loaded, ReadError> {
 /// # Errors
 /// As [`load`].
 pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Result<Loaded, ReadError> {
-    let Loader { sources, files, order, mut diagnostics, .. } = Loader::read(root, read)?;
+    load_knowing(root, read, cache, None)
+}
+
+/// Does the same as [`load`], and takes spaces from earlier loads.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_among(root: &Path, read: &ReadFile<'_>, known: &mut KnownSpaces) -> Result<Loaded, ReadError> {
+    let KnownSpaces { maps, files, spaces } = known;
+    load_knowing(root, read, maps, Some((files, spaces)))
+}
+
+fn load_knowing(
+    root: &Path,
+    read: &ReadFile<'_>,
+    cache: &mut MapCache,
+    known: Option<(&mut KnownFiles, &mut BTreeMap<Vec<PathBuf>, KnownSpace>)>,
+) -> Result<Loaded, ReadError> {
+    let (known_files, spaces) = known.unzip();
+    let Loader { sources, files, order, mut diagnostics, .. } = Loader::read(root, read, known_files)?;
     // A file that does not parse lacks declarations, and their uses would be reported as unknown. So it is
     // checked for the names alone, and the checker's diagnostics are dropped.
     let is_whole = !diagnostics.iter().any(Diagnostic::is_error);
-    let mut maps = MapReader { read, files: &files, texts: BTreeMap::new(), cache };
-    if is_whole {
-        maps.parse();
-        diagnostics.extend(check_digests(&mut maps));
+    let root = &files[0].tree;
+    let has_scenario = root.items.iter().any(|item| item.kind.as_scenario().is_some());
+    let has_policy = root.items.iter().any(|item| item.kind.as_policy().is_some());
+    let spaces = spaces.filter(|_| is_whole && (has_scenario || has_policy) && !declares(&files[0]));
+    let is_shared = spaces.is_some();
+    let used: Vec<PathBuf> = files[1..].iter().map(|file| file.path.clone()).collect();
+    let known = spaces.as_ref().and_then(|spaces| spaces.get(&used).cloned());
+    let mut maps =
+        MapReader { read, files: &files, texts: BTreeMap::new(), meanings: BTreeMap::new(), cache };
+    let mut runs = Runs::default();
+    let mut known = match known {
+        Some(mut known) => {
+            maps.meanings = std::mem::take(&mut known.meanings);
+            diagnostics.extend(check_digests(&mut maps));
+            known
+        }
+        None => {
+            if is_whole {
+                maps.parse();
+                diagnostics.extend(check_digests(&mut maps));
+            }
+            let declared = References::declared(if is_shared { &files[1..] } else { &files });
+            let checked = check_space(&order, &mut maps, is_whole, declared);
+            runs = checked.runs;
+            let space = checked.space.map(Arc::new);
+            let (diagnostics, references) = (checked.diagnostics, checked.references);
+            let known = KnownSpace { space, diagnostics, references, meanings: BTreeMap::new() };
+            if let Some(spaces) = spaces {
+                spaces.insert(
+                    used,
+                    KnownSpace { meanings: std::mem::take(&mut maps.meanings), ..known.clone() },
+                );
+            }
+            known
+        }
+    };
+    if is_shared {
+        known.references.add(&files[0]);
     }
-    let checked = check_space(&order, &mut maps, is_whole);
-    let Checked { space, runs, diagnostics: found, mut references } = checked;
-    files.iter().for_each(|file| scenario_names::note(&file.tree, &mut references));
-    references.settle(&sources);
+    files.iter().for_each(|file| scenario_names::note(&file.tree, &mut known.references));
+    known.references.settle(&sources);
+    let KnownSpace { space, diagnostics: found, references, .. } = known;
     let (mut remarks, found): (Vec<_>, Vec<_>) =
         found.into_iter().partition(|found| found.severity == Severity::Note);
     diagnostics.extend(found.into_iter().filter(|_| is_whole));
     let space = space.filter(|_| !diagnostics.iter().any(Diagnostic::is_error));
-    let root = &files[0].tree;
-    let has_scenario = root.items.iter().any(|item| item.kind.as_scenario().is_some());
     let scenario = space
         .as_ref()
         .filter(|_| has_scenario)
         .and_then(|space| scenario::scenario(root, space).map_err(|found| diagnostics.extend(found)).ok());
-    let has_policy = root.items.iter().any(|item| item.kind.as_policy().is_some());
     let policy = space.as_ref().filter(|_| has_policy).and_then(|space| {
         policy::policy(sources.text(FileId(0)), root, space).map_err(|found| diagnostics.extend(found)).ok()
     });
@@ -141,7 +222,6 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
         remarks.clear();
     }
     let (diagnostics, remarks) = (as_many_as_help(merged(diagnostics)), as_many_as_help(merged(remarks)));
-    let space = space.map(Arc::new);
     let runs = if has_scenario || has_policy { Runs::default() } else { runs };
     Ok(Loaded { sources, diagnostics, remarks, files, references, space, scenario, policy, runs })
 }
@@ -182,22 +262,24 @@ fn as_many_as_help(mut found: Vec<Diagnostic>) -> Vec<Diagnostic> {
 
 /// The files that a file uses, itself included, however far away. Nothing is checked.
 pub fn files_used(root: &Path, read: &ReadFile<'_>) -> Vec<PathBuf> {
-    let files = Loader::read(root, read).map(|loader| loader.files).unwrap_or_default();
+    let files = Loader::read(root, read, None).map(|loader| loader.files).unwrap_or_default();
     files.into_iter().map(|file| file.path).collect()
 }
 
-fn check_space(order: &[usize], maps: &mut MapReader<'_>, is_whole: bool) -> Checked {
-    let files = maps.files;
-    let declares = |file: &LoadedFile| {
-        let declares = |item: &ast::Item| match &item.kind {
-            ItemKind::Language(_) | ItemKind::Scenario(_) | ItemKind::Policy(_) => false,
-            // A `use` that leaves something out makes a space of its own.
-            ItemKind::Use(used) => !used.without.is_empty(),
-            _ => true,
-        };
-        // A file that uses several others is a space of its own, which none of them is.
-        uses(file).count() > 1 || file.tree.items.iter().any(declares)
+/// Whether a file is a space of its own.
+fn declares(file: &LoadedFile) -> bool {
+    let declares = |item: &ast::Item| match &item.kind {
+        ItemKind::Language(_) | ItemKind::Scenario(_) | ItemKind::Policy(_) => false,
+        // A `use` that leaves something out makes a space of its own.
+        ItemKind::Use(used) => !used.without.is_empty(),
+        _ => true,
     };
+    // A file that uses several others is a space of its own, which none of them is.
+    uses(file).count() > 1 || file.tree.items.iter().any(declares)
+}
+
+fn check_space(order: &[usize], maps: &mut MapReader<'_>, is_whole: bool, declared: References) -> Checked {
+    let files = maps.files;
     // A scenario file declares no space: its space is the first file that declares something.
     let index = files.iter().position(declares).unwrap_or(0);
     let root = &files[index];
@@ -212,7 +294,7 @@ fn check_space(order: &[usize], maps: &mut MapReader<'_>, is_whole: bool) -> Che
     let aside = overriding::set_aside(files, &standing);
     let items: Vec<&ast::Item> = standing.iter().map(AsRef::as_ref).collect();
     let maps = is_whole.then_some(maps as &mut dyn Maps);
-    let mut checked = checker::space(root, &items, &aside, References::declared(files), maps);
+    let mut checked = checker::space(root, &items, &aside, declared, maps);
     diagnostics.append(&mut checked.diagnostics);
     Checked { diagnostics, ..checked }
 }
@@ -278,6 +360,7 @@ pub(super) fn maps_named(file: &LoadedFile) -> impl Iterator<Item = (&str, Span)
 
 struct Loader<'a> {
     read: &'a ReadFile<'a>,
+    known: Option<&'a mut KnownFiles>,
     sources: Sources,
     files: Vec<LoadedFile>,
     /// Indices of files, imports before the files that use them.
@@ -306,10 +389,14 @@ fn words(text: &str) -> usize {
 }
 
 impl<'a> Loader<'a> {
-    fn read(root: &Path, read: &'a ReadFile<'a>) -> Result<Loader<'a>, ReadError> {
+    fn read(
+        root: &Path,
+        read: &'a ReadFile<'a>,
+        known: Option<&'a mut KnownFiles>,
+    ) -> Result<Loader<'a>, ReadError> {
         let sources = Sources::new();
         let (files, order, diagnostics) = (Vec::new(), Vec::new(), Vec::new());
-        let mut loader = Loader { read, sources, files, order, diagnostics, words: 0 };
+        let mut loader = Loader { read, known, sources, files, order, diagnostics, words: 0 };
         loader.read_file(&normal(root), &mut Vec::new())?;
         Ok(loader)
     }
@@ -319,7 +406,9 @@ impl<'a> Loader<'a> {
         if self.files.iter().any(|file| file.path == path) {
             return Ok(());
         }
-        let text = (self.read)(path)?;
+        let place = (self.files.len(), path.to_owned());
+        let known = self.known.as_ref().and_then(|known| known.get(&place).cloned());
+        let text = known.as_ref().map_or_else(|| (self.read)(path), |known| Ok(known.text.clone()))?;
         self.words += words(&text);
         // The parser says it of a root that is too long by itself.
         if self.words > WORDS_MAX && !self.files.is_empty() {
@@ -327,8 +416,15 @@ impl<'a> Loader<'a> {
                 format!("with it, the files of the space have more than {WORDS_MAX} words and signs");
             return Err(ReadError(message));
         }
-        let file = self.sources.add(path.display().to_string(), text);
-        let (tree, found) = parse(file, self.sources.text(file));
+        let file = self.sources.add(path.to_string_lossy(), text);
+        let (tree, found) = match known {
+            Some(known) => (known.tree, known.diagnostics),
+            None => parse(file, self.sources.text(file)),
+        };
+        if let Some(known) = self.known.as_mut().filter(|known| place.0 > 0 && !known.contains_key(&place)) {
+            let text = self.sources.text(file).to_owned();
+            known.insert(place, KnownFile { text, tree: tree.clone(), diagnostics: found.clone() });
+        }
         self.diagnostics.extend(found);
         let index = self.files.len();
         self.files.push(LoadedFile { path: path.to_owned(), tree });
@@ -344,16 +440,15 @@ impl<'a> Loader<'a> {
         for used in uses {
             let target = normal(&folder(path).join(&used.path.value));
             if let Some(begin) = way.iter().position(|step| *step == target) {
-                let circle: Vec<String> =
-                    way[begin..].iter().map(|step| step.display().to_string()).collect();
+                let circle: Vec<String> = way[begin..].iter().map(|step| step.shown().to_string()).collect();
                 let error = Diagnostic::error(code::IMPORT_CYCLE, "files use each other in a circle");
                 let error = error.at(used.path.span, "this closes the circle");
-                let error = error.note(format!("{} → {}", circle.join(" → "), target.display()));
+                let error = error.note(format!("{} → {}", circle.join(" → "), target.shown()));
                 self.diagnostics.push(error.help("move what both need into a file that uses neither"));
                 continue;
             }
             if let Err(error) = self.read_file(&target, way) {
-                let message = format!("cannot read `{}`", target.display());
+                let message = format!("cannot read `{}`", target.shown());
                 self.diagnostics
                     .push(Diagnostic::error(code::UNREADABLE, message).at(used.path.span, error.to_string()));
             }
@@ -368,6 +463,8 @@ struct MapReader<'a> {
     read: &'a ReadFile<'a>,
     files: &'a [LoadedFile],
     texts: BTreeMap<PathBuf, Result<MapText, ReadError>>,
+    /// What files mean, as far as it was asked.
+    meanings: BTreeMap<PathBuf, Option<Meaning>>,
     cache: &'a mut MapCache,
 }
 
@@ -407,22 +504,20 @@ impl MapReader<'_> {
             }
         }
         let open: Vec<_> = open.into_iter().collect();
-        for some in open.chunks(MAPS_AT_ONCE) {
-            let parsed: Vec<_> = std::thread::scope(|scope| {
-                let workers: Vec<_> =
-                    some.iter().map(|(_, (path, text))| scope.spawn(move || map_of(path, text))).collect();
-                workers
-                    .into_iter()
-                    .map(|worker| worker.join().expect("no map makes its reader panic"))
-                    .collect()
-            });
-            cache.known.extend(some.iter().map(|(key, _)| key.clone()).zip(parsed));
-        }
+        let parsed = in_order(&open, MAPS_AT_ONCE, |(_, (path, text))| map_of(path, text));
+        cache.known.extend(open.into_iter().map(|(key, _)| key).zip(parsed));
     }
 
     /// What a file means with all that it uses, as far as all could be read.
     fn meaning(&mut self, path: &Path) -> Option<Meaning> {
-        meaning(self.files, path, &mut |map| self.text(map).as_ref().ok().map(|map| map.digest.clone()))
+        if let Some(known) = self.meanings.get(path) {
+            return known.clone();
+        }
+        let files = self.files;
+        let digest = &mut |map: &Path| self.text(map).as_ref().ok().map(|map| map.digest.clone());
+        let found = meaning(files, path, digest);
+        self.meanings.insert(path.to_owned(), found.clone());
+        found
     }
 }
 

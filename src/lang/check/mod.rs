@@ -55,7 +55,8 @@ mod unused;
 pub use checker::{Claim, Runs};
 pub use difference::{Change, Difference, differences};
 pub use load::{
-    Loaded, LoadedFile, MapCache, ReadError, ReadFile, WrittenPath, files_used, load, load_with, normal,
+    KnownSpaces, Loaded, LoadedFile, MapCache, ReadError, ReadFile, WrittenPath, files_used, load,
+    load_among, load_with, normal,
 };
 pub use missing_use::suggest_uses;
 pub use references::{Declaration, Occurrence, References, Symbol};

@@ -281,20 +281,28 @@ impl References {
         for item in files.iter().flat_map(|file| &file.tree.items) {
             references.declare_item(item);
         }
-        for file in files {
-            for used in uses(file) {
-                references.note(used.path.span, Symbol::File(used_path(file, used)), false);
-                for name in &used.without {
-                    references.uses_target(name.span, &name.text);
-                    references.uses(name.span, Symbol::Rule(name.text.clone()));
-                    references.uses(name.span, Symbol::Requirement(name.text.clone()));
-                }
-            }
-            for (path, span) in maps_named(file) {
-                references.note(span, Symbol::File(path_from(file, path)), false);
+        files.iter().for_each(|file| references.names_files(file));
+        references
+    }
+
+    /// Adds what a scenario or policy file declares, and the files that it names.
+    pub(super) fn add(&mut self, file: &LoadedFile) {
+        file.tree.items.iter().for_each(|item| self.declare_item(item));
+        self.names_files(file);
+    }
+
+    fn names_files(&mut self, file: &LoadedFile) {
+        for used in uses(file) {
+            self.note(used.path.span, Symbol::File(used_path(file, used)), false);
+            for name in &used.without {
+                self.uses_target(name.span, &name.text);
+                self.uses(name.span, Symbol::Rule(name.text.clone()));
+                self.uses(name.span, Symbol::Requirement(name.text.clone()));
             }
         }
-        references
+        for (path, span) in maps_named(file) {
+            self.note(span, Symbol::File(path_from(file, path)), false);
+        }
     }
 
     /// Notes a use. The use of a symbol that is declared nowhere is dropped: its name stands for nothing.

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::check::state_argument::memory_from;
-use crate::check::{Loaded, ReadError, differences, load, suggest_uses};
+use crate::check::{KnownSpaces, Loaded, ReadError, differences, load, load_among, suggest_uses};
 use crate::model::rules::RowRules;
 use crate::model::vocabulary::{Body, Priority, Word};
 use crate::model::{
@@ -37,13 +37,17 @@ road corner {
 
 /// Loads files given as `(name, text)`; the first is the root.
 fn load_files(files: &[(&str, &str)]) -> Loaded {
+    load(Path::new(files[0].0), &|path| read(files, path)).unwrap()
+}
+
+/// The text of a file, or of the map that the repository ships.
+fn read(files: &[(&str, &str)], path: &Path) -> Result<String, ReadError> {
     let map = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios/roads/corner.xodr");
-    load(Path::new(files[0].0), &|path| match files.iter().find(|(name, _)| Path::new(name) == path) {
+    match files.iter().find(|(name, _)| Path::new(name) == path) {
         Some((_, text)) => Ok((*text).to_owned()),
-        None if path.ends_with("corner.xodr") => Ok(std::fs::read_to_string(&map).unwrap()),
+        None if path.ends_with("corner.xodr") => Ok(std::fs::read_to_string(map).unwrap()),
         None => Err(ReadError("no such file".to_owned())),
-    })
-    .unwrap()
+    }
 }
 
 /// Loads a file that declares more than `BASE`.
@@ -134,6 +138,43 @@ fn scenarios_are_read() {
 }
 
 /// A time is compared in the unit and to the decimals in which it is written.
+#[test]
+fn a_space_that_is_known_changes_nothing() {
+    let space = format!("{BASE}{CLOCK}");
+    let broken = space.replace("gap(v: Speed)", "gap(v: Sped)");
+    let wrong = SCENARIO.replace("road: corner", "road: other");
+    let sealed = SCENARIO.replace("\"a.ava\"", "\"a.ava\" digest \"sha256:0\"");
+    let further = format!("{SCENARIO}let more = 3 m\n");
+    let without = SCENARIO.replace("\"a.ava\"", "\"a.ava\" without chronology");
+    let elsewhere = SCENARIO.replace("\"a.ava\"", "\"broken.ava\"");
+    let twice = format!("{SCENARIO}{}", SCENARIO.split_once("ava\"\n").unwrap().1);
+    let roots = [
+        SCENARIO,
+        &wrong,
+        &sealed,
+        &further,
+        &without,
+        &elsewhere,
+        &twice,
+        "language 1\nlet",
+        &space,
+        SCENARIO,
+    ];
+    let mut known = KnownSpaces::default();
+    let mut shared: Vec<Arc<Space>> = Vec::new();
+    for root in roots {
+        let files = [("s.ava", root), ("a.ava", space.as_str()), ("broken.ava", broken.as_str())];
+        let alone = load_files(&files);
+        let among = load_among(Path::new("s.ava"), &|path| read(&files, path), &mut known).unwrap();
+        assert_eq!(shown(&among), shown(&alone), "{root}");
+        assert_eq!(among.scenario, alone.scenario, "{root}");
+        assert_eq!(among.references.pattern(), alone.references.pattern(), "{root}");
+        assert_eq!(among.space.is_some(), alone.space.is_some(), "{root}");
+        shared.extend(among.space.filter(|_| root == SCENARIO));
+    }
+    assert!(Arc::ptr_eq(&shared[0], &shared[1]), "the space was checked once");
+}
+
 #[test]
 fn times_may_have_any_unit() {
     let space = format!("{BASE}{CLOCK}");

@@ -4,13 +4,11 @@
 //! are drawn. Codes are never reused or renumbered. The caller decides when to stop, and with which
 //! exit status.
 
-use std::borrow::Cow;
-
 use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 use serde::Serialize;
 
 use crate::syntax::ast::{FileId, Span};
-use crate::syntax::scan::is_bidi;
+use avastra_base::outside::{in_line, on_terminal};
 
 /// How severe a diagnostic is. Errors stop a compilation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -196,30 +194,6 @@ pub enum Style {
 /// Width at which long source lines are cut, in characters.
 const WIDTH: usize = 140;
 
-/// Whether a terminal may obey a character: a control character other than a line feed or a tab, or a sign that turns the
-/// direction of writing.
-pub fn acts_on_terminal(character: char) -> bool {
-    !matches!(character, '\n' | '\t') && (character.is_control() || is_bidi(character))
-}
-
-/// A text as it may be written to a terminal: characters that would act on it are written as their numbers (`\u{1b}`).
-pub fn visible(text: &str) -> Cow<'_, str> {
-    if !text.contains(acts_on_terminal) {
-        return Cow::Borrowed(text);
-    }
-    let mut shown = String::with_capacity(text.len() + 16);
-    let mut rest = text.chars().peekable();
-    while let Some(c) = rest.next() {
-        match c {
-            // Windows ends lines so.
-            '\r' if rest.peek() == Some(&'\n') => shown.push(c),
-            c if acts_on_terminal(c) => shown.extend(c.escape_unicode()),
-            c => shown.push(c),
-        }
-    }
-    Cow::Owned(shown)
-}
-
 /// Draws one diagnostic, without a line break at its end.
 pub fn render(diagnostic: &Diagnostic, sources: &Sources, style: Style) -> String {
     let level = match diagnostic.severity {
@@ -227,7 +201,7 @@ pub fn render(diagnostic: &Diagnostic, sources: &Sources, style: Style) -> Strin
         Severity::Warning => Level::WARNING,
         Severity::Note => Level::NOTE,
     };
-    let title = level.primary_title(visible(&diagnostic.message)).id(diagnostic.code);
+    let title = level.primary_title(in_line(&diagnostic.message)).id(diagnostic.code);
     let mut group = Group::with_title(title);
     for file in files_in_order(diagnostic) {
         for labels in pieces(diagnostic, file) {
@@ -238,10 +212,10 @@ pub fn render(diagnostic: &Diagnostic, sources: &Sources, style: Style) -> Strin
         }
     }
     for note in &diagnostic.notes {
-        group = group.element(Level::NOTE.no_name().message(visible(note)));
+        group = group.element(Level::NOTE.no_name().message(on_terminal(note)));
     }
     if let Some(help) = &diagnostic.help {
-        group = group.element(Level::HELP.message(visible(help)));
+        group = group.element(Level::HELP.message(on_terminal(help)));
     }
     let renderer = match style {
         Style::Human => Renderer::styled(),
@@ -299,7 +273,7 @@ fn pieces(diagnostic: &Diagnostic, file: FileId) -> Vec<Vec<&Label>> {
 
 /// The name of a file with the line and column of a place that is not drawn.
 fn origin<'a>(labels: &[&Label], sources: &'a Sources, file: FileId) -> Origin<'a> {
-    let origin = Origin::path(visible(sources.name(file)));
+    let origin = Origin::path(in_line(sources.name(file)));
     match labels.first() {
         Some(label) if !sources.text(file).is_empty() => {
             let (line, column) = sources.line_column(file, label.span.start);
@@ -333,9 +307,9 @@ fn snippet<'a>(
         let to = floor_boundary(text, label.span.end).max(from);
         let kind = if label.primary { AnnotationKind::Primary } else { AnnotationKind::Context };
         let annotation = kind.span(from - start..to - start);
-        if label.text.is_empty() { annotation } else { annotation.label(visible(&label.text)) }
+        if label.text.is_empty() { annotation } else { annotation.label(in_line(&label.text)) }
     });
-    let snippet = Snippet::source(&text[start..end]).line_start(line).path(visible(sources.name(file)));
+    let snippet = Snippet::source(&text[start..end]).line_start(line).path(in_line(sources.name(file)));
     Some(snippet.annotations(annotations))
 }
 
@@ -375,10 +349,6 @@ mod tests {
 
     #[test]
     fn nothing_acts_on_a_terminal() {
-        assert_eq!(
-            visible("a\tb\r\n\u{1b}[2J\r\u{9b}x\u{202e}"),
-            "a\tb\r\n\\u{1b}[2J\\u{d}\\u{9b}x\\u{202e}"
-        );
         let mut sources = Sources::new();
         let file = sources.add("\u{1b}]0;name\u{7}.ava", "let x = \u{1b}[31m \u{9b}3\n");
         let diagnostic = Diagnostic::error("AV0201", "an \u{1b}[2J odd one")

@@ -30,8 +30,7 @@ mod scan;
 mod unfinished;
 mod yaml;
 
-pub use diagnostic::acts_on_terminal;
-pub use diagnostic::{Diagnostic, Fix, Label, Severity, Sources, Style, listed, render, visible};
+pub use diagnostic::{Diagnostic, Fix, Label, Severity, Sources, Style, listed, render};
 pub(crate) use diagnostic::{enumerated, one_of};
 pub use format::{FormatError, format, same_meaning};
 pub use nearest::nearest;

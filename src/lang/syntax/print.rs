@@ -195,9 +195,12 @@ impl Printer<'_> {
 
     fn docs(&mut self, marker: &str, docs: &[Doc]) {
         for doc in docs {
-            self.line(doc.span.start);
-            let text = format!("{marker} {}", doc.text);
-            self.out.push_str(text.trim_end());
+            // The text of a tree that was built may hold line breaks: what follows one must not become code.
+            for line in doc.text.split('\n') {
+                self.line(doc.span.start);
+                let text = format!("{marker} {line}");
+                self.out.push_str(text.trim_end());
+            }
         }
     }
 

@@ -3,7 +3,7 @@
 use crate::syntax::ast::{Arg, Arm, BinaryOp, Call, Expr, ExprKind, Field, Number, UnaryOp};
 use crate::syntax::layout::Layout;
 use crate::syntax::operator::{BASE, Grouping, Operator, level};
-use crate::syntax::scan::is_bidi;
+use avastra_base::outside::is_bidi;
 
 /// An expression in a place where any expression may stand.
 pub fn expression(expr: &Expr) -> Layout {

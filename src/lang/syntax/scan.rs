@@ -8,6 +8,7 @@
 use crate::syntax::ast::{FileId, Span};
 use crate::syntax::keyword::{DECLARING, OPERATORS};
 use crate::syntax::{DEPTH_MAX, Diagnostic, TOKENS_MAX, code};
+use avastra_base::outside::is_bidi;
 
 /// A `//` comment, markers included, up to but without the line break.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -320,11 +321,6 @@ impl Scanner<'_> {
         };
         self.found.problems.push(problem);
     }
-}
-
-/// Whether the character changes the direction in which the text around it is shown.
-pub fn is_bidi(character: char) -> bool {
-    matches!(character, '\u{200e}' | '\u{200f}' | '\u{061c}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 fn bidi(character: char, span: Span) -> Diagnostic {

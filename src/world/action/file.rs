@@ -103,7 +103,7 @@ impl ActionTable {
         let space = self.space();
         serde_yaml::to_string(&Written {
             version: VERSION,
-            space: space.path.display().to_string(),
+            space: space.path.to_string_lossy().into_owned(),
             digest: space.meaning.digest(),
             rules: self.rule_records(),
             rows: self,
@@ -115,7 +115,7 @@ impl ActionTable {
         let space = self.space();
         TableFile {
             version: VERSION,
-            space: space.path.display().to_string(),
+            space: space.path.to_string_lossy().into_owned(),
             digest: space.meaning.digest().to_owned(),
             rules: self.rule_records(),
             rows: self.rows().iter().map(|row| self.row_record(row)).collect(),
