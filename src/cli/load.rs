@@ -518,25 +518,31 @@ fn read_up_to(path: &Path, bytes_max: u64) -> Result<String, ReadError> {
     if !metadata.is_file() {
         return Err(ReadError("it is no regular file".to_owned()));
     }
-    text_of(File::open(path).map_err(unread)?, bytes_max)
+    let bytes = bytes_of(File::open(path).map_err(unread)?, bytes_max)?;
+    // Files of XML may say what encoding they are in.
+    match path.extension().is_some_and(|extension| extension == "xodr" || extension == "xosc") {
+        true => avastra_road::xml_text(bytes).map_err(ReadError),
+        false => utf8(bytes),
+    }
 }
 
 /// The text on standard input, which is a source.
 pub fn stdin() -> Result<String, Failure> {
-    let text = text_of(std::io::stdin().lock(), SOURCE_BYTES_MAX);
+    let text = bytes_of(std::io::stdin().lock(), SOURCE_BYTES_MAX).and_then(utf8);
     text.map_err(|error| Failure::file("read", Path::new("stdin"), error))
 }
 
-/// A text of a limited size. A file may grow while it is read, and a device has no end.
-fn text_of(from: impl Read, bytes_max: u64) -> Result<String, ReadError> {
+/// Bytes of a limited number. A file may grow while it is read, and a device has no end.
+fn bytes_of(from: impl Read, bytes_max: u64) -> Result<Vec<u8>, ReadError> {
     let mut bytes = Vec::new();
     from.take(bytes_max + 1).read_to_end(&mut bytes).map_err(|error| ReadError(reason(&error)))?;
     if bytes.len() as u64 > bytes_max {
         return Err(ReadError(format!("it is larger than {} MiB", bytes_max >> 20)));
     }
-    if path.extension().is_some_and(|extension| extension == "xodr" || extension == "xosc") {
-        return avastra_road::xml_text(bytes).map_err(ReadError);
-    }
+    Ok(bytes)
+}
+
+fn utf8(bytes: Vec<u8>) -> Result<String, ReadError> {
     String::from_utf8(bytes).map_err(|error| {
         ReadError(format!("not text: byte {} is not UTF-8", error.utf8_error().valid_up_to()))
     })

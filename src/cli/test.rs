@@ -490,7 +490,7 @@ impl Case {
     fn in_words(&self) -> (&'static str, String) {
         let (word, reason) = self.outcome.in_words();
         let By { is_recorded, other, loose_plays } = &self.by;
-        let is_fixed = matches!(self.outcome, Outcome::Played(Regression::Fixed));
+        let is_fixed = matches!(self.outcome, Outcome::Played(Regression::Fixed { .. }));
         let word = match is_fixed {
             true if *is_recorded => "changed",
             true if other.is_some() || loose_plays.is_some() => PASSED,
