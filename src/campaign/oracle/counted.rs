@@ -24,6 +24,11 @@ pub fn counts(space: &Space, log: &EpisodeLog, index: usize, judgement: &Judgeme
     counts_by(space, log, index, facts(log, index, judgement))
 }
 
+/// The clauses of the space's verdict that a collision of a log does not meet; empty if it counts.
+pub fn unmet<'a>(space: &'a Space, log: &EpisodeLog, index: usize, judgement: &Judgement) -> Vec<&'a str> {
+    space.unmet(facts(log, index, judgement), log.memory_after(log.collisions[index].step))
+}
+
 fn counts_by(space: &Space, log: &EpisodeLog, index: usize, facts: OutcomeFacts) -> bool {
     space.counts(facts, log.memory_after(log.collisions[index].step))
 }

@@ -24,7 +24,7 @@ pub use avoidable::{
 };
 pub use case::{Fate, Found, Regression, regression};
 pub use cause::{NoModules, diagnose, fate};
-pub use counted::{counted, counted_at_need, counts, facts};
+pub use counted::{counted, counted_at_need, counts, facts, unmet};
 pub use evidence::{
     Chance, Comparison, Diagnosis, Evidence, ModuleFinding, PairFinding, Verdict, WeaknessFinding,
 };

@@ -5,14 +5,14 @@ use std::fmt::Display;
 use crate::episode::{Breach, Collision, EpisodeLog};
 use avastra_drivers::Module;
 use avastra_lang::model::vocabulary::Word;
-use avastra_lang::model::{Claim, Figure, Obstacle, Scenario, Space, digest_text};
+use avastra_lang::model::{COUNTED, Claim, Figure, Obstacle, Scenario, Space, digest_text};
 
 use super::avoidable::Judgement;
 use super::case::Found;
 use super::cause::NoModules;
-use super::facts;
 use super::kept::Breached;
 use super::recurrence::Recurrence;
+use super::{facts, unmet};
 
 /// Of a claim about a breach where there is none.
 const NO_BREACH: &str = "kept, or not in force";
@@ -213,6 +213,10 @@ impl Played<'_> {
         let facts = facts(self.log, index, judgement);
         match self.space.verdict(name, facts, self.log.memory_after(self.log.collisions[index].step)) {
             Some(true) => Ok(()),
+            _ if name == COUNTED => {
+                let unmet = unmet(self.space, self.log, index, judgement).join(", ");
+                Err(format!("not met: {unmet} ({})", in_words(judgement)))
+            }
             _ => Err(format!(
                 "repeated: {}, sudden: {}, struck: {}, priority: {}, {}",
                 facts.repeated,

@@ -24,7 +24,7 @@ use crate::run::settled::{Units, WrittenScenario};
 use crate::run::summary::{EpisodeSummary, Finding};
 
 pub(crate) const LAYOUT: Layout = Layout {
-    version: 15,
+    version: 16,
     schema: || format!("{SCHEMA}{}", step_table()),
     unit: "episode",
     tables: &[
@@ -90,7 +90,7 @@ CREATE TABLE collision (
   side TEXT NOT NULL, approach TEXT NOT NULL, relative_speed_mps REAL NOT NULL, delta_v_mps REAL NOT NULL,
   obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT NOT NULL, precrash TEXT NOT NULL, precrash_number INTEGER, priority TEXT NOT NULL, r157_letter TEXT NOT NULL,
   harm TEXT NOT NULL, harm_share REAL NOT NULL, recurred INTEGER, replays INTEGER,
-  priority_rule TEXT NOT NULL, priority_time_s REAL NOT NULL, priority_motion TEXT NOT NULL,
+  priority_rule TEXT NOT NULL, priority_time_s REAL NOT NULL, priority_motion TEXT NOT NULL, unmet TEXT NOT NULL,
   PRIMARY KEY (episode, number)
 ) STRICT;
 CREATE TABLE breach (
@@ -765,6 +765,7 @@ fn add_collision(
         contact.ruling.rule.name(),
         contact.ruling.time_s,
         contact.ruling.mover.name(),
+        finding.unmet.join("; "),
     ];
     insert_row(transaction, "collision", values)
 }

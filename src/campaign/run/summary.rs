@@ -43,6 +43,8 @@ pub struct Finding {
     /// Modules at fault, if they were looked for.
     pub cause: Option<Vec<Module>>,
     pub counted: bool,
+    /// The clauses of the verdict that it does not meet.
+    pub unmet: Vec<String>,
     /// How often it happens again under other chance, if that was tried.
     pub recurrence: Option<Recurrence>,
     /// Whether it is proved that no step before it can be left out.
@@ -71,6 +73,7 @@ impl EpisodeSummary {
         let find = |(index, judgement)| {
             let facts = oracle::facts(log, index, &judgement);
             let counted = oracle::counts(space, log, index, &judgement);
+            let unmet = oracle::unmet(space, log, index, &judgement);
             let collision = log.collisions[index];
             Finding {
                 number: index,
@@ -80,6 +83,7 @@ impl EpisodeSummary {
                 judgement,
                 cause: None,
                 counted,
+                unmet: unmet.into_iter().map(str::to_owned).collect(),
                 recurrence: None,
                 minimal: false,
             }

@@ -286,7 +286,7 @@ fn collision(
         "at_s": contact.time_s, "obstacle": contact.obstacle, "body": table.space().body_name(found.body),
         "kind": run::kind(found.body.like.name()), "shape": found.shape.name(), "precrash": found.kind.name(),
         "precrash_number": found.kind.number(), "verb": found.verb.name(),
-        "x_m": contact.point.x, "y_m": contact.point.y, "counted": counted, "class": judgement.class.name(),
+        "x_m": contact.point.x, "y_m": contact.point.y, "counted": counted, "unmet": oracle::unmet(table.space(), log, index, judgement), "class": judgement.class.name(),
         "onset_s": judgement.onset_s, "avoided_by": judgement.avoided_by, "letter": judgement.r157_letter,
         "evasion": judgement.evasion, "priority": contact.ruling.priority.name(), "ruling": contact.ruling.describe(), "side": severity.side, "approach": severity.approach,
         "ego_mps": contact.ego_speed_mps, "closing_mps": severity.closing_speed_mps, "delta_v_mps": severity.delta_v_mps,

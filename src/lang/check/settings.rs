@@ -8,7 +8,7 @@ use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{EpisodeField, Fact, Site, StopReason, Word};
 use crate::model::{COUNTED, EpisodeDef, RewardCase, TICK_MS, Type, VerdictDef, code};
 use crate::syntax::ast::{BinaryOp, Comparison, ItemKind, Span};
-use crate::syntax::{Diagnostic, ast};
+use crate::syntax::{Diagnostic, ast, print_expr};
 use avastra_base::units::{Dimension, Rational};
 
 /// The paper's observation period, s.
@@ -195,7 +195,13 @@ impl Checker {
         let names_counted = declared.iter().any(is_counted);
         for (item, declared) in declared {
             if let Some(condition) = self.verdict(declared) {
-                verdicts.push(VerdictDef { name: declared.name.text.clone(), docs: docs(item), condition });
+                let clauses = clauses(&declared.condition).into_iter().map(print_expr).collect();
+                verdicts.push(VerdictDef {
+                    name: declared.name.text.clone(),
+                    docs: docs(item),
+                    condition,
+                    clauses,
+                });
             }
         }
         if !names_counted {
@@ -218,5 +224,16 @@ fn counted() -> VerdictDef {
     let not = |of| Box::new(expr(ExprKind::Not(fact(of))));
     let first = Box::new(expr(ExprKind::And(fact(Fact::Collision), not(Fact::Repeated))));
     let condition = expr(ExprKind::And(first, not(Fact::Sudden)));
-    VerdictDef { name: COUNTED.to_owned(), docs: Vec::new(), condition }
+    let clauses = ["collision", "not repeated", "not sudden"].map(str::to_owned).to_vec();
+    VerdictDef { name: COUNTED.to_owned(), docs: Vec::new(), condition, clauses }
+}
+
+/// What a condition joins by `and`, from left to right.
+fn clauses(condition: &ast::Expr) -> Vec<&ast::Expr> {
+    match &condition.kind {
+        ast::ExprKind::Binary { op: BinaryOp::And, left, right, .. } => {
+            clauses(left).into_iter().chain(clauses(right)).collect()
+        }
+        _ => vec![condition],
+    }
 }

@@ -512,6 +512,22 @@ impl Space {
         Some(evaluate(&verdict.condition, &self.functions, &facts).truth())
     }
 
+    /// The clauses of the verdict [`COUNTED`] that a collision does not meet, as they were written; empty if it counts.
+    pub fn unmet(&self, outcome: OutcomeFacts, memory: &Memory) -> Vec<&str> {
+        let facts = Facts { outcome, ..Facts::new(&[], memory) };
+        let Some(verdict) = self.verdicts.iter().find(|verdict| verdict.name == COUNTED) else {
+            return Vec::new();
+        };
+        let is_unmet = |clause: &&Expr| !evaluate(clause, &self.functions, &facts).truth();
+        let clauses = verdict.condition.clauses();
+        clauses
+            .iter()
+            .zip(&verdict.clauses)
+            .filter(|(clause, _)| is_unmet(clause))
+            .map(|(_, text)| text.as_str())
+            .collect()
+    }
+
     /// Whether a collision counts: the verdict [`COUNTED`].
     pub fn counts(&self, outcome: OutcomeFacts, memory: &Memory) -> bool {
         let counts = self.verdict(COUNTED, outcome, memory);

@@ -134,6 +134,14 @@ impl ExprKind {
 }
 
 impl Expr {
+    /// What a condition joins by `and`, from left to right.
+    pub fn clauses(&self) -> Vec<&Expr> {
+        match &self.kind {
+            ExprKind::And(left, right) => left.clauses().into_iter().chain(right.clauses()).collect(),
+            _ => vec![self],
+        }
+    }
+
     /// Calls `visit` for this expression and everything inside it; bodies of called functions are
     /// not entered, because they know only their arguments.
     pub fn walk(&self, visit: &mut dyn FnMut(&Expr)) {

@@ -620,6 +620,8 @@ pub struct VerdictDef {
     pub name: String,
     pub docs: Vec<String>,
     pub condition: Expr,
+    /// What the condition joins by `and`, as it was written.
+    pub clauses: Vec<String>,
 }
 
 /// A road with its map and the ego vehicle's way through it.

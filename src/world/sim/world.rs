@@ -39,7 +39,7 @@ use super::traffic::TrafficProfile;
 
 /// Name of this simulated world. Raised whenever the same seed no longer gives the same episode and trace, so that an
 /// old scenario is told apart from a refuted one.
-pub const ENGINE: &str = "plane/9";
+pub const ENGINE: &str = "plane/10";
 
 /// One physics step, s: 50 Hz.
 pub const DT_S: f64 = TICK_MS as f64 / 1000.0;

@@ -78,6 +78,8 @@ export interface Finding {
   x_m: number;
   y_m: number;
   counted: boolean;
+  /** The clauses of the verdict that it does not meet. */
+  unmet: string[];
   class: string;
   onset_s: number;
   avoided_by: string[];

@@ -80,7 +80,7 @@ function again({ recurrence }) {
 
 function verdict(recording, collision, seek, watchDrivers) {
   const { summary } = recording.header;
-  const says = collision.counted ? "Counts" : "Does not count";
+  const says = collision.counted ? "Counts" : `Does not count (not met: ${collision.unmet.join(", ")})`;
   const jump = el("button", { type: "button", onclick: () => seek(collision.at_s) }, `Go to ${atTime(collision.at_s)}`);
   const watch =
     collision.ways.length > 0 &&
