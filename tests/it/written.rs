@@ -42,6 +42,12 @@ impl Table {
     fn numbers(&self, who: &str, column: &str) -> Vec<f64> {
         self.of_user(who, column).iter().map(|text| text.parse().expect("a number")).collect()
     }
+
+    /// How fast it is, tick by tick, m/s.
+    fn speeds_mps(&self, who: &str) -> Vec<f64> {
+        let [x, y] = ["vx_mps", "vy_mps"].map(|column| self.numbers(who, column));
+        x.iter().zip(&y).map(|(x, y)| (x * x + y * y).sqrt()).collect()
+    }
 }
 
 /// The cells of `table --try`.
@@ -52,9 +58,7 @@ fn tried(name: &str) -> Vec<Value> {
 
 #[test]
 fn who_is_to_be_early_keeps_to_the_limits_of_its_body() {
-    let table = Table::of("tearly");
-    let [vx, vy] = ["vx_mps", "vy_mps"].map(|column| table.numbers("cyclist", column));
-    let speeds: Vec<f64> = vx.iter().zip(&vy).map(|(x, y)| x.hypot(*y)).collect();
+    let speeds = Table::of("tearly").speeds_mps("cyclist");
     let gained: Vec<f64> = speeds.windows(2).map(|pair| (pair[1] - pair[0]) / 0.02).collect();
     let (most, least) =
         gained.iter().fold((0.0_f64, 0.0_f64), |(most, least), mps2| (most.max(*mps2), least.min(*mps2)));
@@ -84,9 +88,7 @@ fn a_row_stands_in_one_lane() {
 #[test]
 fn a_road_says_when_its_lights_begin_also_in_a_written_scenario() {
     // It stops at the light, which is red for as long.
-    let speeds =
-        Table::of("tphase").numbers("", "vx_mps").into_iter().zip(Table::of("tphase").numbers("", "vy_mps"));
-    let slowest = speeds.map(|(x, y)| x.hypot(y)).fold(f64::INFINITY, f64::min);
+    let slowest = Table::of("tphase").speeds_mps("").into_iter().fold(f64::INFINITY, f64::min);
     assert!(slowest < 0.1, "{slowest} m/s");
 }
 
