@@ -17,7 +17,7 @@ pub struct LaneIndex(pub usize);
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 pub struct LaneKey {
     pub road: String,
-    /// Index of the lane section within the road.
+    /// Index of the lane section within the road. A section in which a limit or access changes counts as several.
     pub section: usize,
     /// OpenDRIVE's lane id: negative to the right of the reference line.
     pub lane: i32,

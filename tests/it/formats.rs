@@ -90,7 +90,7 @@ fn what_the_readers_ask_for_is_what_the_tables_call_read() {
         let table = of_code(path);
         let of = |fate: usize| table.values().flat_map(move |fates| fates[fate].iter().map(String::as_str));
         let is_read: BTreeSet<&str> = of(0).collect();
-        let files = folders.iter().flat_map(|folder| files_below(&root().join(folder), "rs"));
+        let files = folders.iter().flat_map(|folder| files_below(root().join(folder), "rs"));
         let files = files.filter(|file| !file.ends_with("vocabulary.rs"));
         let code: String = files.map(|file| std::fs::read_to_string(file).expect("it is there")).collect();
         let (mut asked, mut quoted) = (BTreeSet::new(), BTreeSet::new());

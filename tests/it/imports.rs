@@ -139,7 +139,7 @@ fn every_file_comes_out_as_it_says() {
         let (status, stdout, stderr) = outcome(&mut avastra(&["import", "--out", &folder, &file]));
         let is_refused = comments.clone().any(|comment| comment.starts_with("refused: "));
         assert_eq!(status, if is_refused { 2 } else { 0 }, "{stdout}{stderr}");
-        let rows = if is_refused { Vec::new() } else { rows(&folder, &name) };
+        let rows = if is_refused { Vec::new() } else { rows(&folder, name) };
         for comment in comments {
             if let Some(words) = comment.strip_prefix("refused: ").or_else(|| comment.strip_prefix("note: "))
             {

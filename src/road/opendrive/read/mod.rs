@@ -274,10 +274,6 @@ impl Reader {
         }
         // OpenDRIVE asks for this order; not every file keeps it.
         types.sort_by(|a, b| a.begin_m.total_cmp(&b.begin_m));
-        // What is said first holds before it, too.
-        if let Some(first) = types.first_mut() {
-            first.begin_m = first.begin_m.min(0.0);
-        }
         let elevation = self.elevation(road);
         self.ignore_slopes(road)?;
         if let Some(rule) = road.attribute("rule").filter(|rule| !["LHT", "RHT"].contains(rule)) {
