@@ -420,7 +420,7 @@ fn the_schema_of_every_message_is_printed() {
 }
 
 /// A program that is a shell script around a toy: what a user changes while the command stays the same.
-pub fn script(folder: &Path, before: &str, toy: &str) -> String {
+fn script(folder: &Path, before: &str, toy: &str) -> String {
     let path = folder.join("planner");
     let text = format!("#!/bin/sh\n{before}\nexec {} ads toy {toy}\n", cargo_bin("avastra").display());
     std::fs::write(&path, text).expect("a script is written");
