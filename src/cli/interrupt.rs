@@ -14,8 +14,8 @@ static STOP: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
 /// Listens for Ctrl-C, and for SIGTERM, by which schedulers, containers and `timeout` end a command.
 pub fn listen() {
-    // Every later thread inherits that it does not receive SIGTERM, so the one that waits for it does. What is started does
-    // not inherit it: the standard library clears the mask of a child.
+    // Every later thread inherits that it does not receive SIGTERM, so the one that waits for it does. Processes would inherit
+    // it, too: `external::link` clears the mask where it starts one.
     let mut terminate = SigSet::empty();
     terminate.add(Signal::SIGTERM);
     if terminate.thread_block().is_ok() {

@@ -204,7 +204,7 @@ fn play_all(
         ));
     }
     if critical.is_empty() && kept.is_empty() && is_over && !is_protocol {
-        output.say("next: `--keep 3` keeps the nearest misses to look at; more episodes or other roads (`--road`) may find more");
+        output.say("next: `--keep 3` keeps the nearest misses; other roads may find more");
     }
     let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {

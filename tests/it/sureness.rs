@@ -292,3 +292,12 @@ fn a_terminated_run_prints_its_summary() {
     assert_eq!(output.status.code(), Some(130), "{stdout}{stderr}");
     assert!(stdout.contains(" of simulated time") && stderr.contains("--resume"), "{stdout}{stderr}");
 }
+
+/// What waits for SIGTERM blocks it in its threads, and a driving system must end by it all the same.
+#[test]
+fn a_driving_system_is_started_with_no_signal_blocked() {
+    // Its first line is no message, so it is shown.
+    let command = ["run", SPACE, "--road", "corner", "--ads", "grep SigBlk /proc/self/status"];
+    let (_, stdout, stderr) = outcome(&mut avastra(&command));
+    assert!(stderr.contains("SigBlk: 0000000000000000"), "{stdout}{stderr}");
+}

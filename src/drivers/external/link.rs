@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
-use nix::sys::signal::{Signal, killpg};
+use nix::sys::signal::{SigSet, Signal, killpg};
 use nix::unistd::Pid;
 
 use avastra_base::outside::Shown;
@@ -429,7 +429,8 @@ fn start(words: &[String], settings: &ExternalSettings) -> Result<Ends, String> 
         }
         command.current_dir(directory);
     }
-    let mut child = command.spawn().map_err(|error| format!("`{}` cannot be started: {error}", words[0]))?;
+    let spawned = with_no_signal_blocked(|| command.spawn());
+    let mut child = spawned.map_err(|error| format!("`{}` cannot be started: {error}", words[0]))?;
     groups().extend(i32::try_from(child.id()));
     let (stdin, stdout, stderr) = (child.stdin.take(), child.stdout.take(), child.stderr.take());
     let stdout = stdout.expect("it was asked for");
@@ -439,6 +440,17 @@ fn start(words: &[String], settings: &ExternalSettings) -> Result<Ends, String> 
         fcntl(fd, FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).map_err(|error| format!("its pipes: {error}"))?;
     }
     Ok(Ends::Process { child, stdin, stdout, stderr })
+}
+
+/// A child inherits which signals are blocked: avastra waits for SIGTERM in one thread and blocks it in the others, and a
+/// driving system must still end by it.
+fn with_no_signal_blocked<T>(spawn: impl FnOnce() -> T) -> T {
+    let before = SigSet::thread_get_mask();
+    // Both fail only for masks that do not exist.
+    let _ = SigSet::empty().thread_set_mask();
+    let spawned = spawn();
+    let _ = before.and_then(|before| before.thread_set_mask());
+    spawned
 }
 
 fn status_text(status: ExitStatus) -> String {
