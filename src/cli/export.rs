@@ -59,7 +59,7 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
     })?;
     let mut refuted = 0;
     for Exported { file, written, left_out, refused } in &exported.done {
-        refused.iter().for_each(|step| output.warn(&format!("{}: {step}", file.display())));
+        refused.iter().for_each(|step| output.warn(&format!("{}: {step}", file.shown())));
         if !left_out.is_empty() {
             output.aside(&format!("{}: left out: {}", file.shown(), left_out.join("; ")));
         }

@@ -32,17 +32,17 @@ struct Tick {
     is_yellow: bool,
 }
 
-/// An episode, and its ticks up to the first contact.
+/// An episode, and its ticks up to that of the first contact.
 fn watched(run: &Run, number: usize) -> (EpisodeLog, Vec<Tick>) {
     let first = run.episode(number);
     let script = avastra::episode::Script::of_log(&first);
     let (mut ticks, mut touched) = (Vec::new(), false);
     let mut watch = |world: &World, _: &dyn avastra::ads::Ads, contacts: &[avastra::sim::Contact]| {
-        touched |= !contacts.is_empty();
-        // Nothing has happened yet before the first tick.
+        // Nothing has happened yet before the first tick; that of the first contact is the last one.
         if touched || world.ticks() == 0 {
             return;
         }
+        touched = !contacts.is_empty();
         let moment = world.moment_facts();
         ticks.push(Tick {
             time_s: world.time_s(),
@@ -191,10 +191,11 @@ fn what_is_asked_of_each_road_user_near_is_asked_of_each_by_itself() {
         let mut past: Vec<(OrientedBox, BTreeMap<u32, OrientedBox>)> = Vec::new();
         let (mut left_s, mut close): (Option<f64>, Vec<bool>) = (None, Vec::new());
         let mut watch = |world: &World, _: &dyn avastra::ads::Ads, contacts: &[avastra::sim::Contact]| {
-            touched |= !contacts.is_empty();
+            // The tick of the first contact is the last one.
             if touched || world.ticks() == 0 {
                 return;
             }
+            touched = !contacts.is_empty();
             let (time_s, drives) = (world.time_s(), world.ego().speed_mps >= 2.0);
             for obstacle in
                 world.obstacles().filter(|obstacle| !obstacle.is_apart && obstacle.distance_m <= 100.0)

@@ -19,10 +19,14 @@ const NEWER: [&str; 6] = [
 ];
 
 /// Where avastra says otherwise than every analyst, and why it does.
-const ARGUED: [(&str, &str); 2] = [
+const ARGUED: [(&str, &str); 3] = [
     (
         "i09_ball_and_child",
         "a ball that has rolled off is no road user that UN R157's driver would brake for",
+    ),
+    (
+        "y01_late_yellow_other_starts_on_red",
+        "both passed their lights, so neither has priority, and no excuse covers the ego vehicle",
     ),
     ("r04_circulating_truck_creeps_in", "it left room to brake gently, so it had given way (article 1)"),
 ];

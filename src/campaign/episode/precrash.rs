@@ -189,6 +189,8 @@ pub(super) struct Way {
     pub steps: Vec<Step>,
     /// What its route or its way has for it where it is, as far as that is known.
     pub intends: Option<Manoeuvre>,
+    /// Whether what it intends is known: of a vehicle that one of our drivers leads along lanes.
+    pub is_known: bool,
 }
 
 impl Way {
@@ -226,10 +228,10 @@ impl Way {
         self.intends.or_else(|| self.manoeuvre_until(self.steps.len() - 1))
     }
 
-    /// Whether it turns, or is known to intend what it does.
+    /// Whether it does on purpose what it does.
     fn means_to(&self) -> bool {
         let turns = matches!(self.manoeuvre(), Some(Manoeuvre::LeftTurn | Manoeuvre::RightTurn));
-        self.intends.is_some() || turns
+        turns || self.intends.is_some() || !self.is_known && self.manoeuvre().is_some()
     }
 
     /// Whether it went aside as fast as in a lane change at some step up to this one.
@@ -505,7 +507,7 @@ mod tests {
     fn way(places: &[Place]) -> Way {
         let step =
             |place: &Place| Step { place: *place, off_road_m: -1.5, in_junction: false, lane_rad: 0.0 };
-        Way { steps: places.iter().map(step).collect(), intends: None }
+        Way { steps: places.iter().map(step).collect(), intends: None, is_known: true }
     }
 
     /// The ego vehicle drives 50 m along +x at 10 m/s; in town, at no junction.

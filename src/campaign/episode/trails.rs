@@ -57,6 +57,7 @@ impl Trails {
         let way = |places: &mut dyn Iterator<Item = Place>, ends: Place| Way {
             steps: places.chain([ends]).map(|place| step(map, place)).collect(),
             intends: None,
+            is_known: false,
         };
         let whole = way(&mut self.looks.iter().map(|look| look.ego), ego_ends).shape();
         let (Some(first), Some(obstacle)) = (self.looks.front(), world.obstacle(contact.obstacle)) else {
@@ -80,6 +81,7 @@ impl Trails {
             let at_junction = facts.in_next_junction || facts.junction_ahead_m < BEGINS_M;
             turn(facts.turn).filter(|_| at_junction)
         });
+        other.is_known = world.keeps_to_lanes(contact.obstacle);
         if world.changes_lanes(contact.obstacle) {
             other.intends = other.intends.or(Some(Manoeuvre::LaneChange));
         }

@@ -579,6 +579,12 @@ impl World {
         })
     }
 
+    /// Whether a driver leads the road user with an id along lanes.
+    pub fn keeps_to_lanes(&self, id: u32) -> bool {
+        let user = self.users.iter().find(|user| user.obstacle.id == id);
+        user.is_some_and(|user| matches!(user.mover.motion, super::road_user::Motion::Drive(_)))
+    }
+
     /// Whether the road user with an id drives a lane change.
     pub fn changes_lanes(&self, id: u32) -> bool {
         let user = self.users.iter().find(|user| user.obstacle.id == id);
