@@ -333,17 +333,22 @@ fn headline_of(space: &Space, log: &EpisodeLog, summary: &EpisodeSummary, about:
     recurrence.map_or_else(|| what.clone(), again)
 }
 
+fn capitalised(text: &str) -> String {
+    let (first, rest) = text.split_at(1);
+    first.to_ascii_uppercase() + rest
+}
+
 /// What happens, in a sentence for the reader.
 fn headline(space: &Space, log: &EpisodeLog, collision: &Collision) -> String {
     let contact = &collision.contact;
     format!(
-        "{} npc#{} ({}) is hit at {:.2} s by an ego vehicle at {:.1} km/h on {}. Priority: {}.",
+        "{} npc#{} ({}) is hit at {:.2} s by an ego vehicle at {:.1} km/h on {}. {}.",
         space.body_name(collision.body),
         contact.obstacle,
         collision.verb.name(),
         contact.time_s,
         contact.ego_speed_mps * 3.6,
         log.road,
-        contact.ruling.describe()
+        capitalised(&contact.ruling.describe())
     )
 }

@@ -225,7 +225,10 @@ impl Way {
     }
 
     fn manoeuvre(&self) -> Option<Manoeuvre> {
-        self.intends.or_else(|| self.manoeuvre_until(self.steps.len() - 1))
+        // One that goes aside slowly drifts, however far.
+        let drifts = |seen: &Manoeuvre| *seen == Manoeuvre::LaneChange && !self.goes_aside();
+        let seen = self.manoeuvre_until(self.steps.len() - 1).filter(|seen| !drifts(seen));
+        self.intends.or(seen)
     }
 
     /// Whether it does on purpose what it does.
@@ -234,10 +237,10 @@ impl Way {
         turns || self.intends.is_some() || !self.is_known && self.manoeuvre().is_some()
     }
 
-    /// Whether it went aside as fast as in a lane change at some step up to this one.
-    fn goes_aside(&self, step: usize) -> bool {
+    /// Whether it went aside as fast as in a lane change.
+    fn goes_aside(&self) -> bool {
         let goes = |step: &Step| step.place.velocity_mps.dot(&step.left()).abs() > CHANGES_MPS;
-        self.steps[..=step].iter().any(goes)
+        self.steps.iter().any(goes)
     }
 
     /// Its heading as it came to the junction that it is in; if it has been in it all the time, at the beginning.
@@ -257,11 +260,7 @@ impl Way {
         match self.shape_until(step) {
             Shape::LeftTurn if turns => Some(Manoeuvre::LeftTurn),
             Shape::RightTurn if turns => Some(Manoeuvre::RightTurn),
-            _ => {
-                // One that goes aside slowly drifts, however far.
-                let changes = self.aside_m(0, step).abs() > CHANGES_M && self.goes_aside(step);
-                changes.then_some(Manoeuvre::LaneChange)
-            }
+            _ => (self.aside_m(0, step).abs() > CHANGES_M).then_some(Manoeuvre::LaneChange),
         }
     }
 
@@ -273,7 +272,7 @@ impl Way {
     fn changes_lanes(&self) -> bool {
         match self.manoeuvre() {
             Some(manoeuvre) => manoeuvre == Manoeuvre::LaneChange,
-            None => self.goes_aside(self.steps.len() - 1),
+            None => self.goes_aside(),
         }
     }
 
