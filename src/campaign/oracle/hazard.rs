@@ -90,18 +90,18 @@ pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<Ons
 /// Where the ego vehicle had to give way at a junction that it is in at the contact: the station of the line before which it
 /// had to wait (of a light, a sign, or the edge of the junction), m.
 pub fn waiting_line_m(world: &World, contact: &Contact) -> Option<f64> {
-    let at_junction = match contact.ruling.rule {
+    let at_junction = matches!(
+        contact.ruling.rule,
         Rule::Siren
-        | Rule::Light
-        | Rule::BothLights
-        | Rule::StopSign
-        | Rule::FirstToStop
-        | Rule::Sign
-        | Rule::Turning
-        | Rule::FromTheRight
-        | Rule::SameSide => true,
-        _ => false,
-    };
+            | Rule::Light
+            | Rule::BothLights
+            | Rule::StopSign
+            | Rule::FirstToStop
+            | Rule::Sign
+            | Rule::Turning
+            | Rule::FromTheRight
+            | Rule::SameSide
+    );
     let (route, map) = (&world.scene().route, &world.scene().map);
     let front_m = VehicleParameters::MKZ.front_m(world.ego_station_m());
     let is_inside = |part: &&RouteLane| map.lane(part.lane).junction.is_some();

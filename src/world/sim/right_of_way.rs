@@ -920,12 +920,12 @@ impl Strip {
 fn on_foot(this: &Obstacle, strip: &Strip, around: &Around) -> Ruling {
     let route = &around.scene.route;
     let ruling = |priority, rule| Ruling { priority, rule, mover: Mover::Other, time_s: around.time_s() };
-    let crosswalks = || route.crosswalks_m.iter().filter(|_| this.body != Body::Object);
+    let mut crosswalks = route.crosswalks_m.iter().filter(|_| this.body != Body::Object);
     let at = |(from_m, to_m): &&(f64, f64)| (from_m - KERB_M..to_m + KERB_M).contains(&strip.station_m);
-    if let Some((from_m, _)) = crosswalks().find(at) {
-        if light_before(*from_m, around) != Some(SignalColour::Green) {
-            return ruling(Priority::Other, Rule::Crosswalk);
-        }
+    if let Some((from_m, _)) = crosswalks.find(at)
+        && light_before(*from_m, around) != Some(SignalColour::Green)
+    {
+        return ruling(Priority::Other, Rule::Crosswalk);
     }
     match strip.leaves_room(around) {
         true => ruling(Priority::None, Rule::OnFoot),
