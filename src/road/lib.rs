@@ -40,7 +40,8 @@ pub use heights::{Heights, is_apart};
 pub use lane_change::STRIP_M_MAX;
 pub use map::{
     Crosswalk, Junction, Lane, LaneIndex, LaneKey, LanePlace, LeftOut, Neighbour, Obstacle, Precedence,
-    RoadError, RoadMap, Side, Sign, SignKind, SignLine, Signal, Solid, StopLine, Strip, StripKind, Turn,
+    RoadError, RoadMap, SIGNS_BEFORE_M, Side, Sign, SignKind, SignLine, Signal, Solid, StopLine, Strip,
+    StripKind, Turn,
 };
 pub use opendrive::{Lines, well_formed, xml_text};
 pub use proposal::{Proposal, propose};

@@ -280,12 +280,12 @@ impl RoadMap {
     }
 
     /// A lane inside a junction, and the lanes that lead to it, one before the other, until they are
-    /// [`APPROACH_M`] long or come out of another junction.
+    /// [`SIGNS_BEFORE_M`] long or come out of another junction.
     pub fn approach(&self, lane: LaneIndex) -> impl Iterator<Item = LaneIndex> + '_ {
         let mut away_m = 0.0;
         let lanes = core::iter::successors(Some(lane), move |after| {
             let before = *self.lane(*after).predecessors.first()?;
-            let is_near = away_m < APPROACH_M && self.lane(before).junction.is_none();
+            let is_near = away_m < SIGNS_BEFORE_M && self.lane(before).junction.is_none();
             away_m += self.lane(before).centre.length_m();
             is_near.then_some(before)
         });
@@ -433,7 +433,7 @@ impl RoadMap {
 const BEYOND_M: f64 = 0.1;
 
 /// How far before a junction its lights and signs may stand, m. Ours.
-const APPROACH_M: f64 = 40.0;
+pub const SIGNS_BEFORE_M: f64 = 40.0;
 
 /// Limit on the lanes of an approach: no real one has sections of 20 cm.
 const APPROACH_LANES_MAX: usize = 200;

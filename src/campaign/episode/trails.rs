@@ -81,8 +81,9 @@ impl Trails {
             let at_junction = facts.in_next_junction || facts.junction_ahead_m < BEGINS_M;
             turn(facts.turn).filter(|_| at_junction)
         });
-        other.is_known = world.keeps_to_lanes(contact.obstacle);
-        if world.changes_lanes(contact.obstacle) {
+        let changes_lanes = world.changes_lanes(contact.obstacle);
+        other.is_known = changes_lanes.is_some();
+        if changes_lanes == Some(true) {
             other.intends = other.intends.or(Some(Manoeuvre::LaneChange));
         }
         let ticks: Vec<u64> = met.iter().map(|(look, _)| look.tick).chain([world.ticks()]).collect();

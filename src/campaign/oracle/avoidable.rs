@@ -46,15 +46,13 @@ use avastra_world::sim::{
 };
 
 use super::hazard::{Onset, last_chance, onset, waiting_line_m};
-use super::lawful::{careful_mps, lawful_mps};
+use super::lawful::{COMFORTABLE_MPS2, careful_mps, lawful_mps, stops_within_mps};
 use crate::episode::{run_into_from_behind, struck};
 
 /// A driver that is held to a speed comes near to it in about this time, s. Ours: longer than the pedal's lag.
 const CATCH_UP_S: f64 = 0.6;
-/// A driver that is too fast slows down by as much, m/s²: a comfortable stop. Ours.
-const SLOWS_MPS2: f64 = 3.0;
 /// A driver that gives way waits this far before the line, m. Ours.
-const WAITS_M: f64 = 1.0;
+const LINE_GAP_M: f64 = 1.0;
 /// A vehicle that was run into from behind keeps its way if its middle stays this near to it, m. Ours.
 const KEEPS_M: f64 = 1.0;
 /// The careful drivers: a collision that one of them avoids is avoidable. UN R157's two performance models.
@@ -196,9 +194,7 @@ pub fn judge_one(recording: &[World], contact: &Contact, met: OrientedBox) -> Ju
     let earliest = (last + 1).saturating_sub(ticks(REWIND_S));
     let reacts = shoved(recording, met).map(|shove| (shove + ticks(CAREFUL_REACTION_S)).min(last));
     let earliest = earliest.max(reacts.unwrap_or(0));
-    let line_m = recording.last().and_then(|world| waiting_line_m(world, contact));
-    let chance = last_chance(recording, contact, met, line_m);
-    let from = onset.first.min(chance.unwrap_or(last)).max(earliest);
+    let from = onset.first.min(last_chance(recording, contact, met).unwrap_or(last)).max(earliest);
     let mut case = Case::new(recording, from, contact);
     // The letter keeps the recorded path and speed, whoever had to give way.
     let to_the_letter =
@@ -251,11 +247,6 @@ fn shoved(recording: &[World], met: OrientedBox) -> Option<usize> {
         }
     }
     None
-}
-
-/// The speed from which a comfortable stop takes this way, m/s.
-fn stops_within_mps(room_m: f64) -> f64 {
-    (2.0 * SLOWS_MPS2 * room_m.max(0.0)).sqrt()
 }
 
 fn names<'a>(drivers: impl Iterator<Item = &'a str>) -> Vec<String> {
@@ -431,12 +422,14 @@ impl<'a> Case<'a> {
     fn held(&self, control: Control, world: &World) -> Control {
         let front_m = VehicleParameters::MKZ.front_m(world.ego_station_m());
         let waits = self.waits_at_m.filter(|line_m| *line_m > front_m);
-        let waits_mps = waits.map_or(f64::INFINITY, |line_m| stops_within_mps(line_m - front_m - WAITS_M));
+        let waits_mps = waits.map_or(f64::INFINITY, |line_m| {
+            stops_within_mps(line_m - front_m - LINE_GAP_M, 0.0, COMFORTABLE_MPS2)
+        });
         let most_mps = self.speed_mps_max.min(careful_mps(world)).min(waits_mps);
         // Harder than comfortably, where the line comes up too soon for that.
-        let slows_mps2 = if waits_mps <= most_mps { CAREFUL_BRAKING_MPS2 } else { SLOWS_MPS2 };
+        let slows_mps2 = if waits_mps <= most_mps { CAREFUL_BRAKING_MPS2 } else { COMFORTABLE_MPS2 };
         let wanted_mps2 = (most_mps - world.ego().speed_mps) / CATCH_UP_S;
-        if wanted_mps2 < -SLOWS_MPS2 / 2.0 {
+        if wanted_mps2 < -COMFORTABLE_MPS2 / 2.0 {
             let (_, brake_pct) = pedals_for(wanted_mps2.max(-slows_mps2));
             return Control { throttle_pct: 0.0, brake_pct: control.brake_pct.max(brake_pct), ..control };
         }

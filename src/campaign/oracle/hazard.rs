@@ -1,10 +1,17 @@
 //! The onset of a hazard: when a collision began to take shape.
-//! A moment belongs to the hazard if the obstacle was on the ego vehicle's way or heading for it, or if one of the two
-//! visibly did something that the other need not expect: it was beyond the middle of the road or beside its lane, came
-//! out of its lane sideways, was in a junction that it was not allowed to enter (a red light, late yellow, a stop sign that it
-//! passed without standing), was on foot on the carriageway or waited at a crosswalk, or stood in the ego vehicle's way. A thing
-//! that stands beside the way is no hazard. Take the last uninterrupted series of such moments before the contact: the onset is its first moment at which the
-//! obstacle could be seen. So the judgement begins with the first violation or visible intention of either.
+//!
+//! A moment belongs to the hazard if the obstacle was on the ego vehicle's way or heading for it, or if one of the two visibly did
+//! something that the other need not expect:
+//! - it was beyond the middle of the road or beside its lane, or came out of its lane sideways;
+//! - it was in a junction that it was not allowed to enter: at red, late at yellow, past a stop sign without having stood;
+//! - it drove into a junction across the route of the ego vehicle, which goes first there;
+//! - it stood or crept in the ego vehicle's way;
+//! - it was on foot on the carriageway, or waited at a crosswalk.
+//!
+//! A thing that stands beside the way is no hazard.
+//!
+//! Take the last uninterrupted series of such moments before the contact. The onset is its first moment at which the obstacle
+//! could be seen. So the judgement begins with the first violation or visible intention of either.
 //!
 //! The way is the one that the ego vehicle took, as wide as the vehicle and the 0.375 m by which careful drivers
 //! wander (UN R157, Annex 4, Appendix 3); heading for it means to meet it at constant velocity before the
@@ -17,16 +24,13 @@ use avastra_base::kinematics::{
 };
 use avastra_drivers::in_sight;
 use avastra_lang::model::vocabulary::{Body, Priority};
-use avastra_road::RouteLane;
+use avastra_road::{RouteLane, SIGNS_BEFORE_M};
 use avastra_world::sim::{Contact, DT_S, FRAME_TICKS, Obstacle, Rule, VehicleParameters, World};
 
 use super::lawful::waits_at_crosswalk;
 
 /// Places of a prediction and of the ego vehicle's way are compared at this many ticks, 0.2 s.
 const STRIDE: usize = 2 * FRAME_TICKS as usize;
-
-/// A line at which a vehicle waits is at most so far before its junction, m.
-const APPROACH_M: f64 = 40.0;
 
 /// Two beginnings of a hazard, as indices in a recording of the worlds up to the contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -111,25 +115,22 @@ pub fn waiting_line_m(world: &World, contact: &Contact) -> Option<f64> {
     let entry = before.take_while(is_inside).last()?;
     let lights = route.stop_lines.iter().map(|line| line.station_m);
     let signs = route.sign_lines.iter().map(|line| line.station_m);
-    let near = |line_m: &f64| (entry.from_m - APPROACH_M..=entry.from_m + 1.0).contains(line_m);
+    let near = |line_m: &f64| (entry.from_m - SIGNS_BEFORE_M..=entry.from_m + 1.0).contains(line_m);
     let line_m = lights.chain(signs).filter(near).fold(f64::NEG_INFINITY, f64::max);
     let line_m = if line_m.is_finite() { line_m } else { entry.from_m };
     (contact.ruling.priority != Priority::Ego && at_junction && line_m < front_m).then_some(line_m)
 }
 
-/// Index of the last moment at which a careful driver could still stop before the place of a collision in which the ego
-/// vehicle had to give way (`line_m`: or before the line at which it had to wait); if the obstacle came into sight later, index of that moment. The ego vehicle's violation begins
-/// there, though it may not be in the junction yet. `None` if it did not have to give way, or the obstacle was not in sight.
-pub fn last_chance(
-    recording: &[World],
-    contact: &Contact,
-    met: OrientedBox,
-    line_m: Option<f64>,
-) -> Option<usize> {
+/// Index of the last moment at which a careful driver could still stop: before the line at which the ego vehicle had to wait
+/// ([`waiting_line_m`]), or where there is none, before the place of a collision in which it had to give way. If the obstacle
+/// came into sight later, index of that moment. The ego vehicle's violation begins there, though it may not be in the junction
+/// yet. `None` if it did not have to give way, or the obstacle was not in sight.
+pub fn last_chance(recording: &[World], contact: &Contact, met: OrientedBox) -> Option<usize> {
+    let last = recording.last()?;
+    let line_m = waiting_line_m(last, contact);
     if contact.ruling.priority != Priority::Other && line_m.is_none() {
         return None;
     }
-    let last = recording.last()?;
     let mut sensed = last.sensed();
     // To the line it is as much less as the front is beyond it at the contact.
     let front_m = VehicleParameters::MKZ.front_m(last.ego_station_m());

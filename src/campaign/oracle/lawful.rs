@@ -14,9 +14,10 @@ use avastra_world::sim::{Obstacle, SignalColour, VehicleParameters, World};
 const TOLERANCE_MPS: f64 = 1.0;
 /// A person no farther from a crosswalk waits to cross on it, m. Ours.
 const WAITS_M: f64 = 1.5;
-/// Braking before a crosswalk at which a person waits, m/s²: that of a comfortable stop. Ours.
-const GENTLE_MPS2: f64 = 3.0;
-/// From what comes into sight until full braking, s: half of the time in which braking builds up counts as none.
+/// Braking of a comfortable stop, before a crosswalk at which a person waits or before a line, m/s². Ours.
+pub const COMFORTABLE_MPS2: f64 = 3.0;
+/// From the moment when something comes into sight until full braking, s. For half of the time in which braking builds up, a
+/// driver counts as not braking.
 const DELAY_S: f64 = CAREFUL_DELAY_S + CAREFUL_BRAKING_MPS2 / CAREFUL_JERK_MPS3 / 2.0;
 /// A careful driver that sees no farther than this keeps a car's width of it in hand, m. Ours.
 const SPARE_M: f64 = 2.0;
@@ -27,7 +28,7 @@ pub fn careful_mps(world: &World) -> f64 {
     let limit_mps = scene.map.lane(scene.route.lane_at(world.ego_station_m()).lane).speed_limit_mps;
     let conditions = world.conditions();
     let braking_mps2 = CAREFUL_BRAKING_MPS2.min(conditions.friction * GRAVITY_MPS2);
-    let sight_mps = stops_within_mps(conditions.visibility_m - SPARE_M, braking_mps2);
+    let sight_mps = stops_within_mps(conditions.visibility_m - SPARE_M, DELAY_S, braking_mps2);
     limit_mps.min(sight_mps).min(crosswalk_mps(world))
 }
 
@@ -42,7 +43,7 @@ fn crosswalk_mps(world: &World) -> f64 {
     let front_m = VehicleParameters::MKZ.front_m(world.ego_station_m());
     let Some((begin_m, _)) = next_crosswalk(world) else { return f64::INFINITY };
     match world.obstacles().any(|obstacle| waits_at_crosswalk(world, obstacle)) {
-        true => stops_within_mps((begin_m - front_m).max(0.0), GENTLE_MPS2),
+        true => stops_within_mps(begin_m - front_m, DELAY_S, COMFORTABLE_MPS2),
         false => f64::INFINITY,
     }
 }
@@ -68,10 +69,10 @@ fn next_crosswalk(world: &World) -> Option<(f64, f64)> {
     next.filter(|(begin_m, _)| world.light_before(*begin_m) != Some(SignalColour::Green))
 }
 
-/// The speed from which a driver stops within a distance, m/s.
-fn stops_within_mps(room_m: f64, braking_mps2: f64) -> f64 {
+/// The speed from which a driver that begins to brake after some time stops within a distance, m/s.
+pub fn stops_within_mps(room_m: f64, delay_s: f64, braking_mps2: f64) -> f64 {
     // v t + v² / 2a = room.
-    let delay_mps = DELAY_S * braking_mps2;
+    let delay_mps = delay_s * braking_mps2;
     (delay_mps * delay_mps + 2.0 * braking_mps2 * room_m.max(0.0)).sqrt() - delay_mps
 }
 
@@ -84,7 +85,7 @@ mod tests {
     fn a_driver_stops_within_the_distance_from_the_speed_that_it_gives() {
         for room_m in [0.0, 1.0, 26.4, 50.0, 300.0] {
             for braking_mps2 in [3.0, 7.6] {
-                let mps = stops_within_mps(room_m, braking_mps2);
+                let mps = stops_within_mps(room_m, DELAY_S, braking_mps2);
                 assert!((stopping_m(mps, DELAY_S, braking_mps2) - room_m).abs() < 1e-9);
             }
         }

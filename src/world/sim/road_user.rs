@@ -583,9 +583,12 @@ impl Mover {
         matches!(&self.motion, Motion::Drive(driver) if driver.has_siren)
     }
 
-    /// Whether it drives a lane change.
-    pub fn is_changing_lanes(&self) -> bool {
-        matches!(&self.motion, Motion::Drive(driver) if driver.is_changing_lanes())
+    /// Whether it drives a lane change; `None` of what no driver leads along lanes.
+    pub fn changes_lanes(&self) -> Option<bool> {
+        match &self.motion {
+            Motion::Drive(driver) => Some(driver.is_changing_lanes()),
+            Motion::Guide(_) | Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => None,
+        }
     }
 
     /// Whether it drives, and ignores a rule of the road.

@@ -263,7 +263,7 @@ impl World {
 
     /// Dimensions, mass and limits of a road user; `None` if there is none with that id.
     pub fn body(&self, id: u32) -> Option<&BodyParameters> {
-        self.users.iter().find(|user| user.obstacle.id == id).map(|user| &user.mover.size)
+        self.user(id).map(|user| &user.mover.size)
     }
 
     pub fn ticks(&self) -> u64 {
@@ -322,7 +322,7 @@ impl World {
 
     /// What can be asked about the road user with an id, if it is there.
     pub fn npc_facts(&self, id: u32) -> Option<NpcFacts> {
-        let user = self.users.iter().find(|user| user.obstacle.id == id)?;
+        let user = self.user(id)?;
         let facts = npc_facts(&self.alone(), &user.obstacle, &user.mover.motion);
         let (priority, crashed) = (user.mover.rights.now(self.ticks), user.mover.has_crashed());
         Some(NpcFacts { priority, crashed, ..facts })
@@ -340,28 +340,28 @@ impl World {
 
     /// How far the road user with an id is with its manoeuvre; 0 if it is not there.
     pub fn phases(&self, id: u32) -> PhaseCount {
-        let user = self.users.iter().find(|user| user.obstacle.id == id);
+        let user = self.user(id);
         user.map_or(PhaseCount::default(), |user| user.mover.phases)
     }
 
     /// The phase that the road user with an id is in: its manoeuvre, by its index in the space, its number from 1, and the tick
     /// in which it began.
     pub fn phase(&self, id: u32) -> Option<(usize, u32, u64)> {
-        let user = self.users.iter().find(|user| user.obstacle.id == id)?;
+        let user = self.user(id)?;
         user.mover.course.as_ref()?.under_way()
     }
 
     /// Whether the road user with an id has done what a command says: it has the speed, is in the lane and at the place
     /// beside its middle, and the junction of its turn is behind it.
     pub fn has_done(&self, id: u32, command: &Command) -> bool {
-        let user = self.users.iter().find(|user| user.obstacle.id == id);
+        let user = self.user(id);
         let progress = user.and_then(|user| user.mover.motion.progress(&self.alone()));
         progress.is_some_and(|progress| progress.meets(command))
     }
 
     /// By how much the road user with an id missed the moment of its last `early`, s; below 0 if it was too soon.
     pub fn late_s(&self, id: u32) -> Option<f64> {
-        self.users.iter().find(|user| user.obstacle.id == id)?.mover.late_s()
+        self.user(id)?.mover.late_s()
     }
 
     /// The id of the latest bearer of a name, if one is there.
@@ -532,11 +532,6 @@ impl World {
             })
     }
 
-    /// Whether the ego vehicle is in a junction that it entered at a red light.
-    pub fn ego_runs_red(&self) -> bool {
-        self.ego_passed.is_running_red(&self.scene.map, &self.ego.outline)
-    }
-
     /// Whether the ego vehicle is in a junction that it was not allowed to enter: at red, late at yellow, or past a stop sign
     /// without having stood.
     pub fn ego_runs(&self) -> bool {
@@ -573,28 +568,21 @@ impl World {
 
     /// As [`World::ego_runs_stop`], of the road user with an id.
     pub fn runs_stop(&self, id: u32) -> bool {
-        let user = self.users.iter().find(|user| user.obstacle.id == id);
+        let user = self.user(id);
         user.is_some_and(|RoadUser { obstacle, mover }| {
             mover.rights.passed.is_running_stop(&self.scene.map, &obstacle.outline)
         })
     }
 
-    /// Whether a driver leads the road user with an id along lanes.
-    pub fn keeps_to_lanes(&self, id: u32) -> bool {
-        let user = self.users.iter().find(|user| user.obstacle.id == id);
-        user.is_some_and(|user| matches!(user.mover.motion, super::road_user::Motion::Drive(_)))
-    }
-
-    /// Whether the road user with an id drives a lane change.
-    pub fn changes_lanes(&self, id: u32) -> bool {
-        let user = self.users.iter().find(|user| user.obstacle.id == id);
-        user.is_some_and(|user| user.mover.is_changing_lanes())
+    /// Whether the road user with an id drives a lane change; `None` if no driver leads it along lanes.
+    pub fn changes_lanes(&self, id: u32) -> Option<bool> {
+        self.user(id)?.mover.changes_lanes()
     }
 
     /// Whether the road user with an id drives into a junction across the route of the ego vehicle, which goes first there.
     pub fn intrudes(&self, id: u32) -> bool {
         let around = self.alone();
-        let user = self.users.iter().find(|user| user.obstacle.id == id);
+        let user = self.user(id);
         user.is_some_and(|RoadUser { obstacle, mover }| {
             mover.rights.is_intruding(obstacle, &mover.motion, &self.ego_passed, &around)
         })
@@ -602,7 +590,7 @@ impl World {
 
     /// As [`World::ego_runs`], of the road user with an id.
     pub fn runs(&self, id: u32) -> bool {
-        let user = self.users.iter().find(|user| user.obstacle.id == id);
+        let user = self.user(id);
         user.is_some_and(|user| user.mover.rights.passed.is_running(&self.scene.map, &user.obstacle.outline))
     }
 
@@ -624,6 +612,10 @@ impl World {
         let aside_m = (position - path.position_at(self.ego_station_m)).norm();
         let is_near_road = aside_m <= OFF_MAP_M || map.nearest(position, heading_rad, OFF_MAP_M).is_some();
         !is_near_road || self.ego_front_m() >= path.length_m()
+    }
+
+    fn user(&self, id: u32) -> Option<&RoadUser> {
+        self.users.iter().find(|user| user.obstacle.id == id)
     }
 
     /// Station of the ego vehicle's front bumper on the route, m.

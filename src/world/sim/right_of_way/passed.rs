@@ -65,26 +65,21 @@ impl Passed {
         speed_mps: f64,
         around: &Around,
     ) {
-        if speed_mps <= STOOD_MPS {
-            self.stood = Some(around.tick);
-        }
+        self.note_standing(speed_mps, around);
         let passed = from_m..to_m;
         if let Some(line) = lights.iter().rfind(|line| passed.contains(&line.station_m)) {
             self.light =
                 Some(PassedLight { signal: line.signal, shown: shown(line.signal, speed_mps, around) });
         }
         if let Some((_, lane)) = stops.find(|(station_m, _)| passed.contains(station_m)) {
-            let stood = self.stood.filter(|tick| around.tick - tick <= ticks(STOOD_S));
-            self.sign = Some(PassedSign { lane, stood });
+            self.sign = Some(PassedSign { lane, stood: self.just_stood(around) });
         }
     }
 
     /// As [`Passed::pass`], of a vehicle that keeps to no lanes: the lines are those of the lane under its front.
     pub fn pass_freely(&mut self, this: &Obstacle, moved: &Moved, around: &Around) {
         let speed_mps = this.velocity_mps.norm();
-        if speed_mps <= STOOD_MPS {
-            self.stood = Some(around.tick);
-        }
+        self.note_standing(speed_mps, around);
         let along_m = this.forward.dot(&(moved.pose.position - this.outline.pose.position));
         if !this.body.is_vehicle() || along_m <= 0.0 {
             return;
@@ -117,9 +112,15 @@ impl Passed {
         here.is_some_and(|here| is_before(here.lane))
     }
 
-    /// Whether the vehicle stood within the last seconds.
-    pub(super) fn has_just_stood(&self, around: &Around) -> bool {
-        self.stood.is_some_and(|tick| around.tick - tick <= ticks(STOOD_S))
+    fn note_standing(&mut self, speed_mps: f64, around: &Around) {
+        if speed_mps <= STOOD_MPS {
+            self.stood = Some(around.tick);
+        }
+    }
+
+    /// When the vehicle last stood, ticks; `None` if that is longer ago than a few seconds.
+    pub(super) fn just_stood(&self, around: &Around) -> Option<u64> {
+        self.stood.filter(|tick| around.tick - tick <= ticks(STOOD_S))
     }
 
     /// Whether the vehicle passed the light of a lane in a junction though it could have stopped, or still has it red

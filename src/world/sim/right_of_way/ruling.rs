@@ -3,8 +3,7 @@
 use avastra_lang::model::vocabulary::Priority;
 
 /// The rules by which priority is decided. Articles are those of the Vienna Convention on Road Traffic (1968).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rule {
     /// Neither came into the other's way by any of these rules.
     #[default]
@@ -108,8 +107,7 @@ impl Rule {
 }
 
 /// Whose motion decided: who came into the other's way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mover {
     Ego,
     Other,

@@ -1,0 +1,253 @@
+//! Two vehicles whose ways cross or join in a junction.
+
+use avastra_base::geometry::Path;
+use avastra_base::kinematics::STANDING_MPS;
+use avastra_lang::model::vocabulary::Priority;
+use avastra_road::LaneIndex;
+
+use super::passed::{Passed, by_stops};
+use super::side::Side;
+use super::{
+    ABRUPT_MPS2, APPROACH_M, Mover, RouteArea, Rule, Ruling, by_lights, by_order, can_stop, room_before_m,
+};
+use crate::sim::around::Around;
+use crate::sim::ego::VehicleParameters;
+use crate::sim::junction::Area;
+use crate::sim::npc::Driver;
+use crate::sim::road_user::{Motion, Obstacle};
+
+/// Vehicles that leave a conflict area this long before the other comes are not in its way, s. Ours.
+const CLEAR_S: f64 = 0.5;
+/// No conflict area is longer, m: lanes of large junctions that join at a small angle.
+const AREA_M: f64 = 60.0;
+/// A path goes along a lane if it is no farther from its middle, m, and no more askew, as a cosine (30°). Ours.
+const ON_LANE_M: f64 = 1.5;
+const ALONG_COS: f64 = 0.866;
+/// A vehicle that stood no farther before a junction stood there to give way, m. Ours.
+const SETS_OUT_M: f64 = 10.0;
+
+/// Another vehicle, as right of way looks at it: what it does, whichever word told it.
+pub(super) struct Vehicle<'a> {
+    pub this: &'a Obstacle,
+    pub speed_mps: f64,
+    pub is_changing_lanes: bool,
+    pub has_siren: bool,
+    pub way: Course<'a>,
+}
+
+/// Where a vehicle goes.
+pub(super) enum Course<'a> {
+    Lanes(&'a Driver),
+    /// A path that keeps to no lanes, and the station of the vehicle's middle on it, m.
+    Path(&'a Path, f64),
+    Nowhere,
+}
+
+impl<'a> Vehicle<'a> {
+    /// `None` of what is no vehicle.
+    pub fn of(this: &'a Obstacle, motion: &'a Motion) -> Option<Vehicle<'a>> {
+        if !this.body.is_vehicle() {
+            return None;
+        }
+        let speed_mps = this.velocity_mps.norm();
+        let plain =
+            Vehicle { this, speed_mps, is_changing_lanes: false, has_siren: false, way: Course::Nowhere };
+        Some(match motion {
+            Motion::Drive(driver) => Vehicle {
+                speed_mps: driver.speed_mps,
+                is_changing_lanes: driver.is_changing_lanes(),
+                has_siren: driver.has_siren,
+                way: Course::Lanes(driver),
+                ..plain
+            },
+            Motion::Guide(guided) if guided.speed_mps >= 0.0 => {
+                let (path, middle_m) = guided.way();
+                Vehicle { way: Course::Path(path, middle_m), ..plain }
+            }
+            Motion::Guide(_) | Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => plain,
+        })
+    }
+
+    /// Whether its front is in a junction, or within so much of one, m.
+    fn is_entering(&self, within_m: f64, around: &Around) -> bool {
+        let outline = &self.this.outline;
+        let reach_m = outline.half_length_m + within_m;
+        let front = outline.pose.offset(reach_m, 0.0);
+        let map = &around.scene.map;
+        let lane = match self.way {
+            Course::Lanes(driver) => Some(driver.way.lane_at(driver.station_m + reach_m).0),
+            Course::Path(..) | Course::Nowhere => {
+                map.nearest(front.position, front.heading_rad, 0.0).map(|place| place.lane)
+            }
+        };
+        lane.is_some_and(|lane| map.lane(lane).junction.is_some())
+    }
+
+    /// From the front to the beginning of its stretch of a conflict area, and from the rear to the end of it, m; `None` if
+    /// it does not go through it.
+    fn through(&self, area: &Area, around: &Around) -> Option<(f64, f64)> {
+        let half_m = self.this.outline.half_length_m;
+        let (station_m, begin_m) = match self.way {
+            Course::Lanes(driver) => {
+                let station_m = driver.station_m;
+                (station_m, driver.way.lane_ahead_m(area.other, station_m - half_m)?)
+            }
+            Course::Path(path, station_m) => {
+                let lane = &around.scene.map.lane(area.other).centre;
+                // It goes through the area as a vehicle on the lane does, or in some other way that is nobody's.
+                let along = |on_lane_m: f64| {
+                    let pose = lane.pose_at(on_lane_m);
+                    let found = path.project(pose.position);
+                    let turned = path.pose_at(found.station_m).forward().dot(&pose.forward());
+                    (found.distance_m < ON_LANE_M && turned > ALONG_COS)
+                        .then_some(found.station_m - on_lane_m)
+                };
+                let middle_m = (area.other_from_m + area.other_to_m) / 2.0;
+                let begin_m = along(middle_m)?;
+                along(area.other_from_m)?;
+                along(area.other_to_m)?;
+                (station_m, begin_m)
+            }
+            Course::Nowhere => return None,
+        };
+        let in_m = begin_m + area.other_from_m - station_m - half_m;
+        Some((in_m, begin_m + area.other_to_m - station_m + half_m))
+    }
+}
+
+/// One vehicle on its way through a conflict area.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Passage {
+    pub lane: LaneIndex,
+    /// From its front to the beginning of the area, m; negative inside.
+    in_m: f64,
+    /// From its rear to the end of the area, m; negative beyond.
+    out_m: f64,
+    speed_mps: f64,
+}
+
+impl Passage {
+    fn is_inside(&self) -> bool {
+        self.in_m <= 0.0 && self.out_m > 0.0
+    }
+
+    /// Whether this vehicle, still on its way to the area, can brake gently for the other, which is in it, or
+    /// need not brake at all.
+    fn has_time_for(&self, other: &Passage) -> bool {
+        let clear_s = other.out_m / other.speed_mps.max(0.5) + CLEAR_S;
+        let comes_s = self.in_m / self.speed_mps.max(0.5);
+        self.in_m > 0.0 && (clear_s < comes_s || can_stop(self.speed_mps, self.in_m, ABRUPT_MPS2))
+    }
+}
+
+/// The ego vehicle and another in a conflict area, or one of them in it and the other before it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Crossing {
+    pub ego: Passage,
+    pub other: Passage,
+}
+
+impl Crossing {
+    /// Where the two are in each other's way soonest.
+    pub fn of(vehicle: &Vehicle, around: &Around) -> Option<Crossing> {
+        let car = VehicleParameters::MKZ;
+        let (front_m, rear_m) = (car.front_m(around.ego_station_m), car.rear_m(around.ego_station_m));
+        let mut best: Option<Crossing> = None;
+        for RouteArea { lane, area } in areas_ahead(around, front_m + APPROACH_M) {
+            let Some((in_m, out_m)) = vehicle.through(area, around) else { continue };
+            let ego = Passage {
+                lane: *lane,
+                in_m: area.from_m - front_m,
+                out_m: area.to_m - rear_m,
+                speed_mps: around.ego.speed_mps,
+            };
+            let other = Passage { lane: area.other, in_m, out_m, speed_mps: vehicle.speed_mps };
+            let found = Crossing { ego, other };
+            if (ego.is_inside() || other.is_inside())
+                && ego.out_m > 0.0
+                && other.out_m > 0.0
+                && other.in_m < APPROACH_M
+                && best.is_none_or(|best| found.away_m() < best.away_m())
+            {
+                best = Some(found);
+            }
+        }
+        best
+    }
+
+    /// How far the later of the two still is from the area, m.
+    fn away_m(&self) -> f64 {
+        self.ego.in_m.max(self.other.in_m)
+    }
+
+    /// Whether the one of the two that is in the area stands across the other's strip.
+    pub fn is_blocked(&self, first: Mover, vehicle: &Vehicle, around: &Around) -> bool {
+        match first {
+            Mover::Ego => Side::of(vehicle, around).is_some_and(|side| side.aside_m < 0.0),
+            Mover::Other | Mover::Both => room_before_m(vehicle.this, around).is_some(),
+        }
+    }
+
+    /// `passed`: the lines that the ego vehicle and the other passed.
+    pub fn ruling(&self, passed: [&Passed; 2], has_siren: bool, around: &Around) -> Ruling {
+        let (by_rule, rule) = match has_siren {
+            true => (Priority::Other, Rule::Siren),
+            false => by_rules([self.ego.lane, self.other.lane], passed, around),
+        };
+        let (ego_first, is_open) = match (self.ego.is_inside(), self.other.is_inside()) {
+            (true, true) => (false, false),
+            (ego_first, _) => (ego_first, true),
+        };
+        let ruling = |priority, rule, mover| Ruling { priority, rule, mover, time_s: around.time_s() };
+        // The first has left the second, which goes before it, room to brake gently: it has given way. An ego vehicle that
+        // passed its light or its sign has not, however early it came; of another one that did, both are to blame.
+        let is_violation = matches!(rule, Rule::Light | Rule::BothLights | Rule::StopSign);
+        match by_rule {
+            Priority::Other
+                if is_open && ego_first && !is_violation && self.other.has_time_for(&self.ego) =>
+            {
+                ruling(Priority::Ego, Rule::Clearing, Mover::Ego)
+            }
+            Priority::Ego if is_open && !ego_first && self.ego.has_time_for(&self.other) => {
+                let priority = if is_violation { Priority::None } else { Priority::Other };
+                ruling(priority, Rule::Clearing, Mover::Other)
+            }
+            _ if !is_open => ruling(by_rule, rule, Mover::Both),
+            _ => ruling(by_rule, rule, if ego_first { Mover::Ego } else { Mover::Other }),
+        }
+    }
+}
+
+/// The conflict areas of the route that the ego vehicle's rear has not passed, up to those that begin before `to_m`.
+fn areas_ahead<'a>(around: &Around<'a>, to_m: f64) -> impl Iterator<Item = &'a RouteArea> {
+    let rear_m = VehicleParameters::MKZ.rear_m(around.ego_station_m);
+    // By rising begin: those that begin too far behind or ahead are left out at once.
+    let areas = &around.scene.route_areas;
+    let first = areas.partition_point(|found| found.area.from_m < rear_m - AREA_M);
+    let last = areas.partition_point(|found| found.area.from_m < to_m);
+    areas[first..last.max(first)].iter().filter(move |found| found.area.to_m > rear_m)
+}
+
+/// Who goes first on two lanes of a junction, those of the ego vehicle and of the other, by the lines that they passed and
+/// by the order of the lanes.
+fn by_rules(lanes: [LaneIndex; 2], passed: [&Passed; 2], around: &Around) -> (Priority, Rule) {
+    let map = &around.scene.map;
+    let [ego_red, other_red] = [0, 1].map(|nth| passed[nth].ran_light(lanes[nth], around));
+    by_lights(ego_red, other_red)
+        .or_else(|| by_stops(lanes, passed, map))
+        .unwrap_or_else(|| by_order(map, lanes[0], lanes[1]))
+}
+
+/// Whether a vehicle drives into a junction across the route of the ego vehicle, which goes first there.
+pub(super) fn intrudes(vehicle: &Vehicle, passed: [&Passed; 2], around: &Around) -> bool {
+    // One that has stood before the junction and sets out shows its intention before it is in it.
+    let within_m = if passed[1].just_stood(around).is_some() { SETS_OUT_M } else { 0.0 };
+    if vehicle.speed_mps < STANDING_MPS || vehicle.has_siren || !vehicle.is_entering(within_m, around) {
+        return false;
+    }
+    let to_m = VehicleParameters::MKZ.rear_m(around.ego_station_m) + APPROACH_M;
+    areas_ahead(around, to_m).any(|RouteArea { lane, area }| {
+        vehicle.through(area, around).is_some_and(|(_, out_m)| out_m > 0.0)
+            && by_rules([*lane, area.other], passed, around).0 == Priority::Ego
+    })
+}

@@ -1,0 +1,71 @@
+//! Pedestrians, animals and things: which come onto the carriageway or into the ego vehicle's way.
+
+use avastra_base::kinematics::CAREFUL_BRAKING_MPS2;
+use avastra_lang::model::vocabulary::{Body, Priority};
+
+use super::{APPROACH_M, Mover, Rule, Ruling, can_stop};
+use crate::sim::around::Around;
+use crate::sim::ego::VehicleParameters;
+use crate::sim::road_user::Obstacle;
+use crate::sim::sense::SignalColour;
+
+/// A pedestrian this near to a crosswalk is on it or about to step on it, m. Ours.
+const KERB_M: f64 = 1.0;
+/// A light this far before a crosswalk holds for it, m. Ours.
+const LIGHT_M: f64 = 12.0;
+
+/// Where a pedestrian is, seen along the ego vehicle's route.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Strip {
+    station_m: f64,
+    /// From the ego vehicle's front to the pedestrian, m; negative beside and behind.
+    pub ahead_m: f64,
+    /// From the strip that the ego vehicle drives on, m; negative in it.
+    pub aside_m: f64,
+}
+
+impl Strip {
+    pub fn of(this: &Obstacle, around: &Around) -> Strip {
+        let route = &around.scene.route;
+        let position = this.outline.pose.position;
+        let found = route.path.project_near(position, around.ego_station_m, APPROACH_M);
+        let ego = route.path.project_near(around.ego_outline.pose.position, around.ego_station_m, 10.0);
+        let half_m = this.outline.half_length_m;
+        Strip {
+            station_m: found.station_m,
+            ahead_m: found.station_m - half_m - VehicleParameters::MKZ.front_m(around.ego_station_m),
+            aside_m: (found.offset_m - ego.offset_m).abs() - half_m - around.ego_outline.half_width_m,
+        }
+    }
+
+    /// Whether the ego vehicle can stop before the pedestrian.
+    pub fn leaves_room(&self, around: &Around) -> bool {
+        can_stop(around.ego.speed_mps, self.ahead_m, CAREFUL_BRAKING_MPS2)
+    }
+}
+
+/// Who has priority, the ego vehicle or a pedestrian, an animal or a thing that comes onto the carriageway or into its way
+/// now.
+pub(super) fn on_foot(this: &Obstacle, strip: &Strip, around: &Around) -> Ruling {
+    let route = &around.scene.route;
+    let ruling = |priority, rule| Ruling { priority, rule, mover: Mover::Other, time_s: around.time_s() };
+    let mut crosswalks = route.crosswalks_m.iter().filter(|_| this.body != Body::Object);
+    let at = |(from_m, to_m): &&(f64, f64)| (from_m - KERB_M..to_m + KERB_M).contains(&strip.station_m);
+    if let Some((from_m, _)) = crosswalks.find(at)
+        && light_before(*from_m, around) != Some(SignalColour::Green)
+    {
+        return ruling(Priority::Other, Rule::Crosswalk);
+    }
+    match strip.leaves_room(around) {
+        true => ruling(Priority::None, Rule::OnFoot),
+        false => ruling(Priority::Ego, Rule::SteppingOut),
+    }
+}
+
+/// The colour of the light before a crosswalk of the route, which begins at a station; green if one of several is.
+pub(in crate::sim) fn light_before(crosswalk_m: f64, around: &Around) -> Option<SignalColour> {
+    let lines = around.scene.route.stop_lines.iter();
+    let lines = lines.filter(|line| (crosswalk_m - LIGHT_M..crosswalk_m).contains(&line.station_m));
+    let colours = lines.map(|line| around.signals.colour(&around.scene.map, line.signal, around.tick));
+    colours.max_by_key(|colour| *colour == SignalColour::Green)
+}

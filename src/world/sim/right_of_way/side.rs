@@ -1,0 +1,241 @@
+//! Two vehicles beside or behind each other, outside junctions: which of them leaves its place.
+
+use core::f64::consts::FRAC_PI_6;
+
+use avastra_base::geometry::{OrientedBox, Vec2, unit_vector};
+use avastra_base::kinematics::STANDING_MPS;
+use avastra_lang::model::vocabulary::Priority;
+use avastra_road::RoadMap;
+
+use super::crossing::{Course, Vehicle};
+use super::{ABRUPT_MPS2, Mover, Rule, Ruling, SIDEWAYS_MPS, can_stop};
+use crate::sim::around::Around;
+use crate::sim::road_user::Obstacle;
+
+/// Way behind another vehicle that may not be cut off, s at its speed (UN R79, 5.6.4.7).
+const HEADWAY_S: f64 = 1.0;
+/// Vehicles with more room than this between them are not in each other's lane in any way that matters, m: one
+/// that is 16 m/s faster brakes at 3 m/s² after 0.4 s within 49 m.
+const LANE_M: f64 = 50.0;
+/// Farther to the side than this a vehicle is in no lane that matters, m.
+const ASIDE_M: f64 = 6.0;
+/// A vehicle that is more askew in its lane turns round or crosses it, rad (30°). Ours.
+const TURNS_RAD: f64 = FRAC_PI_6;
+/// A body that reaches over the border of its lane by more than this leaves it, m. Ours: drivers keep lanes no better.
+const OVER_M: f64 = 0.1;
+
+/// How the ego vehicle and another lie beside the other's way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Side {
+    /// Gap between the flanks across the way, m; negative if one is before the other.
+    pub aside_m: f64,
+    /// Gap between the ends along the way, m; negative if they are side by side.
+    pub apart_m: f64,
+    pub ego_is_ahead: bool,
+    /// Cosine of the angle between the headings: negative if the two come towards each other.
+    pub along: f64,
+    /// Speeds along the way, m/s.
+    pub ego_mps: f64,
+    pub other_mps: f64,
+    /// What each does that the other need not expect.
+    pub ego_does: Option<Rule>,
+    pub other_does: Option<Rule>,
+}
+
+impl Side {
+    /// `None` if the ego vehicle is nowhere near the other's way.
+    pub fn of(vehicle: &Vehicle, around: &Around) -> Option<Side> {
+        let this = vehicle.this;
+        let here = this.outline.pose.position;
+        let map = &around.scene.map;
+        // The way of a vehicle that keeps to lanes; beside a trajectory, the lane that it is on or crosses.
+        let (path, station_m) = match vehicle.way {
+            Course::Lanes(driver) => (&driver.way.path, driver.station_m),
+            Course::Path(..) | Course::Nowhere => {
+                let place = map.nearest(here, this.outline.pose.heading_rad, ASIDE_M)?;
+                (&map.lane(place.lane).centre, place.station_m)
+            }
+        };
+        let away = around.ego_outline.pose.position - here;
+        let way_forward = path.pose_at(station_m).forward();
+        let guess_m = station_m + way_forward.dot(&away);
+        let ego = path.project_from(around.ego_outline.pose.position, guess_m)?;
+        if ego.offset_m.abs() > ASIDE_M {
+            return None;
+        }
+        let other = path.project_from(here, station_m)?;
+        let (ego_length_m, ego_width_m) = around.ego_outline.half_extent_m(around.ego_forward, ego.forward);
+        let (other_length_m, other_width_m) = this.outline.half_extent_m(this.forward, other.forward);
+        let across_m = other.offset_m - ego.offset_m;
+        let apart_m = (other.station_m - ego.station_m).abs() - ego_length_m - other_length_m;
+        if apart_m > LANE_M {
+            return None;
+        }
+        let towards = if across_m >= 0.0 { 1.0 } else { -1.0 };
+        let ego_towards_mps = towards * ego.forward.perp(&around.ego_velocity_mps);
+        let other_towards_mps = -towards * other.forward.perp(&this.velocity_mps);
+        let ego_does = Conduct {
+            outline: around.ego_outline,
+            forward: around.ego_forward,
+            velocity_mps: around.ego_velocity_mps,
+            towards_mps: ego_towards_mps,
+            is_changing_lanes: false,
+        };
+        let other_does = Conduct {
+            outline: &this.outline,
+            forward: this.forward,
+            velocity_mps: this.velocity_mps,
+            towards_mps: other_towards_mps,
+            is_changing_lanes: vehicle.is_changing_lanes,
+        };
+        Some(Side {
+            aside_m: across_m.abs() - ego_width_m - other_width_m,
+            apart_m,
+            ego_is_ahead: ego.station_m > other.station_m,
+            along: around.ego_forward.dot(&this.forward),
+            ego_mps: ego.forward.dot(&around.ego_velocity_mps),
+            other_mps: other.forward.dot(&this.velocity_mps),
+            ego_does: ego_does.rule(map),
+            other_does: other_does.rule(map),
+        })
+    }
+
+    /// Whether the two come towards each other.
+    fn is_oncoming(&self) -> bool {
+        self.along < -0.5
+    }
+
+    /// Whether the vehicle behind keeps its distance to the one ahead if it brakes gently, or not at all.
+    pub fn is_gentle(&self) -> bool {
+        let (behind_mps, ahead_mps) =
+            if self.ego_is_ahead { (self.other_mps, self.ego_mps) } else { (self.ego_mps, self.other_mps) };
+        let ahead_mps = ahead_mps.max(0.0);
+        let room_m = self.apart_m - ahead_mps * HEADWAY_S;
+        self.along > 0.0
+            && self.apart_m > 0.0
+            && can_stop((behind_mps - ahead_mps).max(0.0), room_m, ABRUPT_MPS2)
+    }
+
+    /// Who comes into the lane of the other: the one that has to give way.
+    fn comes(&self, time_s: f64) -> Option<Ruling> {
+        let (priority, rule, mover) = match (self.ego_does, self.other_does) {
+            (Some(_), Some(_)) => (Priority::None, Rule::BothLeaveLanes, Mover::Both),
+            (Some(rule), None) => (Priority::Other, rule, Mover::Ego),
+            (None, Some(rule)) => (Priority::Ego, rule, Mover::Other),
+            (None, None) => return None,
+        };
+        Some(Ruling { priority, rule, mover, time_s })
+    }
+
+    /// Who has priority when the two begin to be in one lane; `None` if that is as for any two in a lane.
+    pub fn at_coming(&self, beyond_middle: impl FnOnce() -> Option<Ruling>, time_s: f64) -> Option<Ruling> {
+        if self.is_oncoming() {
+            return beyond_middle();
+        }
+        let ruling = self.comes(time_s)?;
+        let comes_behind = match ruling.mover {
+            Mover::Ego => !self.ego_is_ahead,
+            Mover::Other => self.ego_is_ahead,
+            Mover::Both => false,
+        };
+        if self.is_gentle() || (self.along > 0.0 && self.apart_m > 0.0 && comes_behind) {
+            return None;
+        }
+        Some(ruling)
+    }
+
+    /// Who has priority in a contact of two that did not come abruptly into one lane.
+    pub fn at_contact(&self, beyond_middle: impl FnOnce() -> Option<Ruling>, time_s: f64) -> Option<Ruling> {
+        let ruling = |priority, rule, mover| Ruling { priority, rule, mover, time_s };
+        if self.is_oncoming() {
+            // Where the middle of the road does not decide, as in a junction, the other has priority unless it leaves its lane.
+            let by_lane = || match self.other_does {
+                Some(rule) => ruling(Priority::Ego, rule, Mover::Other),
+                None => ruling(Priority::Other, self.ego_does.unwrap_or_default(), Mover::Ego),
+            };
+            return Some(beyond_middle().unwrap_or_else(by_lane));
+        }
+        // The ends have met, and not the flanks.
+        if self.along > 0.5 && self.apart_m >= self.aside_m {
+            let backs = |does: Option<Rule>| does == Some(Rule::Backing);
+            return Some(match self.ego_is_ahead {
+                true if backs(self.ego_does) => ruling(Priority::Other, Rule::Backing, Mover::Ego),
+                false if backs(self.other_does) => ruling(Priority::Ego, Rule::Backing, Mover::Other),
+                // It keeps its distance, article 13.5.
+                true => ruling(Priority::Ego, Rule::Distance, Mover::Other),
+                false => ruling(Priority::Other, Rule::Distance, Mover::Ego),
+            });
+        }
+        self.comes(time_s).or_else(|| {
+            // Flank at flank, each in its place: the faster one passes the other.
+            let faster_mps = self.ego_mps - self.other_mps;
+            match () {
+                () if self.along <= 0.5 || faster_mps.abs() < STANDING_MPS => None,
+                () if faster_mps > 0.0 => Some(ruling(Priority::Other, Rule::Overtaking, Mover::Ego)),
+                () => Some(ruling(Priority::Ego, Rule::Overtaking, Mover::Other)),
+            }
+        })
+    }
+}
+
+/// What a vehicle does outside junctions.
+struct Conduct<'a> {
+    outline: &'a OrientedBox,
+    forward: Vec2,
+    velocity_mps: Vec2,
+    /// Speed across the way towards the other vehicle.
+    towards_mps: f64,
+    /// Whether it drives a lane change, as far as that is known.
+    is_changing_lanes: bool,
+}
+
+impl Conduct<'_> {
+    /// The rule by which it has to give way to a vehicle that keeps its lane; `None` if it keeps its own.
+    fn rule(&self, map: &RoadMap) -> Option<Rule> {
+        let speed_mps = self.velocity_mps.norm();
+        if speed_mps < STANDING_MPS {
+            return None;
+        }
+        if self.forward.dot(&self.velocity_mps) < 0.0 {
+            return Some(Rule::Backing);
+        }
+        let pose = &self.outline.pose;
+        let Some(place) = map.nearest(pose.position, pose.heading_rad, 0.0) else {
+            return Some(Rule::Entering);
+        };
+        let lane = map.lane(place.lane);
+        if lane.junction.is_some() {
+            return self.is_changing_lanes.then_some(Rule::LeavingLane);
+        }
+        let along = unit_vector(lane.centre.heading_at(place.station_m));
+        if along.dot(&self.forward).abs() < libm::cos(TURNS_RAD) {
+            return Some(Rule::TurningRound);
+        }
+        let half_m = self.outline.half_extent_m(self.forward, along).1;
+        let over_m = place.offset_m.abs() + half_m - lane.width_at(place.station_m) / 2.0;
+        let moves_over = self.towards_mps > SIDEWAYS_MPS && over_m > OVER_M;
+        (moves_over || self.is_changing_lanes && self.towards_mps > 0.0).then_some(Rule::LeavingLane)
+    }
+}
+
+/// Which of the two has priority because the other is beyond the middle of the road: with any corner, or otherwise at the
+/// point `at` where they touch. Neither has if both are beyond it; `None` if neither of them is.
+pub(super) fn beyond_middle(this: &Obstacle, around: &Around, at: Option<Vec2>) -> Option<Ruling> {
+    let map = &around.scene.map;
+    let told = |ego: bool, other: bool| {
+        let (priority, rule, mover) = match (ego, other) {
+            (true, true) => (Priority::None, Rule::BothBeyondMiddle, Mover::Both),
+            (true, false) => (Priority::Other, Rule::Middle, Mover::Ego),
+            (false, true) => (Priority::Ego, Rule::Middle, Mover::Other),
+            (false, false) => return None,
+        };
+        Some(Ruling { priority, rule, mover, time_s: around.time_s() })
+    };
+    let by_corners = || told(map.is_beyond_middle(around.ego_outline), map.is_beyond_middle(&this.outline));
+    // The middle of a long body may cut a bend whose line its corners keep.
+    let by_point = |point: Vec2| {
+        let is_beyond = |outline: &OrientedBox| map.runs_against(point, outline.pose.heading_rad);
+        told(is_beyond(around.ego_outline), is_beyond(&this.outline))
+    };
+    by_corners().or_else(|| at.and_then(by_point))
+}
