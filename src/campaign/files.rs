@@ -267,6 +267,7 @@ fn write_over(path: &Path, found: &Metadata, bytes: &[u8]) -> Result<()> {
         return temporary.take_place_of(path);
     }
     // That the disk has room for it was tried with the other file, which goes now.
+    drop((temporary, file));
     there.write_all(bytes)?;
     there.set_len(bytes.len() as u64)?;
     there.sync_all()
@@ -406,7 +407,8 @@ pub fn without_further_names(path: &Path) -> Result<()> {
 /// If one of them is not there or cannot be read.
 pub fn are_equal(one: &Path, other: &Path) -> Result<bool> {
     let length = |path| std::fs::symlink_metadata(path).map(|found| found.is_file().then_some(found.len()));
-    let (Some(length), true) = (length(one)?, length(one)? == length(other)?) else { return Ok(false) };
+    let (one_long, other_long) = (length(one)?, length(other)?);
+    let Some(length) = one_long.filter(|_| one_long == other_long) else { return Ok(false) };
     let mut files = [File::open(one)?, File::open(other)?];
     let mut read = [[0; CHUNK], [0; CHUNK]];
     let mut left = length;

@@ -19,11 +19,15 @@ pub fn listen() {
     let mut terminate = SigSet::empty();
     terminate.add(Signal::SIGTERM);
     if terminate.thread_block().is_ok() {
-        std::thread::spawn(move || {
+        let wait = move || {
             while terminate.wait().is_ok() {
                 stop(143);
             }
-        });
+        };
+        if std::thread::Builder::new().spawn(wait).is_err() {
+            // Without a listener, SIGTERM ends the command at once, as usual.
+            let _ = terminate.thread_unblock();
+        }
     }
     if let Err(error) = ctrlc::set_handler(|| stop(130)) {
         remark(&format!("warning: cannot listen for Ctrl-C: {error}"));

@@ -67,15 +67,18 @@ pub fn without_mistakes(loaded: Loaded) -> Result<Loaded, Failure> {
 
 /// Reads and checks a file. For a missing name, the diagnostic names a nearby file that declares it.
 pub fn read_and_check(path: &Path) -> Result<Loaded, Failure> {
-    let own = check::normal(path);
-    check_read(path, &|other| if other == own { read(other) } else { read_used(other) })
+    check_read(path, &reader(path))
 }
 
 /// Does the same for one of many files: the spaces that they use are read once.
 pub fn read_and_check_among(path: &Path, known: &mut KnownSpaces) -> Result<Loaded, Failure> {
+    judged(path, check::load_among(path, &reader(path), known))
+}
+
+/// Reads the file that the user named, and those that it uses.
+fn reader(path: &Path) -> impl Fn(&Path) -> Result<String, ReadError> {
     let own = check::normal(path);
-    let read = |other: &Path| if other == own { read(other) } else { read_used(other) };
-    judged(path, check::load_among(path, &read, known))
+    move |other| if other == own { read(other) } else { read_used(other) }
 }
 
 /// Does the same for a file that has another text than the one on the disk.

@@ -9,7 +9,7 @@ use avastra_base::outside::Shown;
 use avastra_campaign::emit;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::oracle;
-use avastra_campaign::oracle::MIXED;
+use avastra_campaign::oracle::mixed_text;
 use avastra_campaign::run::{
     DEFAULT_ADS, Database, DatabaseError, EpisodeSummary, FoundIn, Group, Numbered, PolicyReference,
     RefusalCount, RequirementCount, Run, RunSettings, Totals, TrafficRecord, play,
@@ -110,8 +110,8 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Plays the episodes that a directory still lacks, and says what all of them came to.
-/// `elsewhere` says how a policy was trained otherwise.
+/// Plays the episodes that a directory still lacks, and says what all of them came to. `elsewhere`: how the policy was trained
+/// otherwise, for the result.
 fn play_all(
     output: &Output,
     (run, mut directory): (Run, Directory),
@@ -460,9 +460,7 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize, is_mixed: bool) -
             totals.recurring,
             plural(totals.replayed as usize, "finding")
         ));
-        if is_mixed {
-            text.push_str(&format!("; {MIXED}"));
-        }
+        text.push_str(&mixed_text(is_mixed));
     }
     if totals.others_crashed > 0 {
         let episodes = plural(totals.others_crashed as usize, "episode");
@@ -520,10 +518,10 @@ pub fn groups_text(groups: &[Group]) -> String {
         };
         let again = match group.recurrence {
             None => ", not played again".to_owned(),
-            Some(of) if group.count == 1 => format!(" {}", of.in_words(false)),
+            Some(of) if group.count == 1 => format!(" {}", of.in_words()),
             Some(of) => {
                 let Group { recurring, tried, .. } = group;
-                format!(" {}; {recurring} of {tried} that were played again recur", of.in_words(false))
+                format!(" {}; {recurring} of {tried} that were played again recur", of.in_words())
             }
         };
         let number = group.precrash_number.map_or(String::new(), |number| format!("{number} "));

@@ -251,7 +251,7 @@ test
   fixed number scenarios without one, by the driving system that they were found with
   passed number scenarios without one, by another driving system, or by one that is not deterministic in all of its plays
   recorded number scenarios that were played from recorded answers: no program was asked
-  changed number scenarios with another crash, that never meet the obstacle, or whose crash a review finds gone
+  changed number scenarios with another crash, that never meet the obstacle, whose crash a review finds gone, or that no longer fail from recorded answers
   errors number scenarios that could not be played
   ads_failed number scenarios in which an external driving system failed
   accepted number scenarios that `--accept` changed

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use avastra_base::outside::Shown;
 use avastra_campaign::emit;
 use avastra_campaign::episode::{Outcome, Script, Setup};
-use avastra_campaign::oracle::{self, Found, MIXED, Worth};
+use avastra_campaign::oracle::{self, Found, Worth, mixed_text};
 use avastra_campaign::run::{self, Asked, EpisodeSummary, Stage};
 use avastra_drivers::Selected;
 use avastra_lang::model::Claim;
@@ -112,12 +112,13 @@ impl Small {
     fn worth_in_words(&self) -> String {
         let [before, after] = &self.worth;
         let first = |priority: &str| match priority {
-            "none" => "no priority".to_owned(),
-            "ego" => "ego first".to_owned(),
-            _ => "the other first".to_owned(),
+            "none" => "no priority",
+            "ego" => "ego first",
+            _ => "the other first",
         };
         let harm = after.harm.map(|harm| format!("{harm} harm"));
-        let kept = [after.kind.map(str::to_owned), harm, after.priority.map(first)];
+        let kept =
+            [after.kind.map(str::to_owned), harm, after.priority.map(|priority| first(priority).to_owned())];
         let kept: Vec<String> = kept.into_iter().flatten().collect();
         let kept = (!kept.is_empty()).then(|| format!("kept: {}", kept.join(", ")));
         let moved = |what: &str, unit: &str, pair: Option<(f64, f64)>| {
@@ -126,8 +127,7 @@ impl Small {
         let kmh = |of: &Worth| of.impact_mps.map(|mps| 3.6 * mps);
         let again = match (before.recurrence, after.recurrence) {
             (Some(before), Some(after)) => {
-                let mixed = if self.is_mixed { format!("; {MIXED}") } else { String::new() };
-                format!("recurs in {before} → {after}{mixed}")
+                format!("recurs in {before} → {after}{}", mixed_text(self.is_mixed))
             }
             _ => "how often it recurs was not tried, because the file does not claim it".to_owned(),
         };
@@ -225,13 +225,7 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
         avastra_lang::syntax::print(&emit::scenario(&table, (&shrunk.log, &summary), shrunk.found, &source));
     write_result(named, path, &text)?;
     write_answers(path, &shrunk.log)?;
-    let recurrence = match shrunk.found {
-        Found::Collision(index) => summary.collisions[index].recurrence,
-        Found::Breach(index) => {
-            let of = shrunk.log.breaches[index].requirement;
-            summary.breached.iter().find(|found| found.requirement == of).and_then(|found| found.recurrence)
-        }
-    };
+    let recurrence = summary.recurrence_of(&shrunk.log, shrunk.found);
     let worth = [
         Worth::new(&log, found, shrunk.recurrence_before),
         Worth::new(&shrunk.log, shrunk.found, recurrence),

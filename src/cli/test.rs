@@ -46,8 +46,8 @@ struct Case {
 struct By {
     /// From recorded answers: no program was asked.
     is_recorded: bool,
-    /// Names of the driving system that it was found with, and of the one that played it, if these differ.
-    other: Option<(String, String)>,
+    /// Name of the driving system that it was found with, if another one played it.
+    found_with: Option<String>,
     /// Plays with the driving system under test, if that need not repeat itself.
     loose_plays: Option<u32>,
 }
@@ -145,8 +145,8 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
             plural(cases.len(), "scenario")
         ));
     }
-    let others = cases.iter().filter_map(|case| case.by.other.as_ref());
-    let found_with: BTreeSet<&str> = others.clone().map(|(found, _)| found.as_str()).collect();
+    let others = cases.iter().filter_map(|case| case.by.found_with.as_deref());
+    let found_with: BTreeSet<&str> = others.clone().collect();
     if !found_with.is_empty() {
         let found_with: Vec<String> = found_with.into_iter().map(|name| format!("`{name}`")).collect();
         output.warn(&format!(
@@ -167,7 +167,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
             let (outcome, reason) = case.in_words();
             serde_json::json!({ "file": case.file, "scenario": case.scenario,
                                 "outcome": outcome, "reason": reason, "recorded": case.by.is_recorded,
-                                "found_with": case.by.other.as_ref().map(|(found, _)| found),
+                                "found_with": case.by.found_with,
                                 "plays": case.by.loose_plays.unwrap_or(1) })
         })
         .collect();
@@ -294,7 +294,7 @@ impl Suite<'_> {
         let program = self.asked.external.as_ref();
         By {
             is_recorded: self.asked.is_nothing() && scenario.origin.ads.as_deref() == Some(EXTERNAL),
-            other: Some(found).zip(played).filter(|(found, played)| found != played),
+            found_with: played.filter(|played| *played != found).map(|_| found),
             loose_plays: program.filter(|program| !program.is_deterministic()).map(|_| 1),
         }
     }
@@ -489,14 +489,15 @@ impl Case {
     /// One of seven words, and why.
     fn in_words(&self) -> (&'static str, String) {
         let (word, reason) = self.outcome.in_words();
-        let By { is_recorded, other, loose_plays } = &self.by;
+        let By { is_recorded, found_with, loose_plays } = &self.by;
         let is_fixed = matches!(self.outcome, Outcome::Played(Regression::Fixed { .. }));
         let word = match is_fixed {
+            // No program was asked, so only avastra can have changed.
             true if *is_recorded => "changed",
-            true if other.is_some() || loose_plays.is_some() => PASSED,
+            true if found_with.is_some() || loose_plays.is_some() => PASSED,
             _ => word,
         };
-        let found_with = other.as_ref().filter(|_| word == PASSED);
+        let found_with = found_with.as_ref().filter(|_| word == PASSED);
         let loosely = loose_plays.map(|plays| match word {
             PASSED => {
                 let (_, [_, most]) = proportion(0, plays);
@@ -511,7 +512,7 @@ impl Case {
         let played = self.outcome.was_played();
         let more = [
             (!reason.is_empty()).then_some(reason),
-            found_with.map(|(found, _)| format!("found with `{found}`")),
+            found_with.map(|found| format!("found with `{found}`")),
             loosely.filter(|_| played),
             (*is_recorded && played).then(|| "by its recorded answers, no program was asked".to_owned()),
         ];

@@ -291,14 +291,15 @@ fn find_recurrence(output: &Output, training: &Training, directory: &mut Directo
     let TrainSettings { agent, without, with, .. } = training.settings();
     let player = Player { command: "train", table: training.table(), agent, without, with };
     let _working = Working::new(output, "playing what it found again");
+    // What is written anew meanwhile is done, and not looked at again.
+    let written = directory.read(Units::scenarios)?;
     let mut done = BTreeSet::new();
     while oracle::can_replay(training.arena().ads()) {
         let next = directory.read(|database| database.to_try(|episode| done.contains(&episode)))?;
         if next.is_empty() {
             break;
         }
-        let written = directory.read(Units::scenarios)?;
-        let examples = written.into_iter().filter(|one| next.contains(&one.unit));
+        let examples = written.iter().filter(|one| next.contains(&one.unit)).cloned();
         let files = run_directory::written(&directory.path, examples.collect());
         done.extend(next);
         // What is edited or gone is the user's.

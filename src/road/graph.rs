@@ -288,9 +288,9 @@ impl<'a> Builder<'a> {
                             return Err(crowded(&document.junctions[junction]));
                         }
                     }
-                    let (limit_mps, kind) = match element.limit {
+                    let (limit_mps, kind) = match element.holds.limit {
                         Limit::Of(limit_mps) => (limit_mps, None),
-                        Limit::No if element.is_motorway => (ADVISED_MPS, Some(&mut free)),
+                        Limit::No if element.holds.is_motorway => (ADVISED_MPS, Some(&mut free)),
                         Limit::No => (LIMIT_MPS_DEFAULT, Some(&mut without)),
                         Limit::Unstated => (LIMIT_MPS_DEFAULT, Some(&mut limitless)),
                     };
@@ -301,8 +301,8 @@ impl<'a> Builder<'a> {
                     self.lanes.insert((road_index, section_index, element.id), index);
                     let mut lane = new_lane(key, centre, limit_mps, road.left_hand, junction);
                     lane.states_limit = states_limit;
-                    lane.is_motorway = element.is_motorway;
-                    lane.for_buses = element.for_buses;
+                    lane.is_motorway = element.holds.is_motorway;
+                    lane.for_buses = element.holds.for_buses;
                     lane.heights = Heights::sampled(lane.centre.length_m(), |station_m| {
                         road.elevation.at(lane.road_station_m(station_m)).value
                     });
@@ -422,7 +422,6 @@ impl<'a> Builder<'a> {
                     let lane = self.map.lane(*lane);
                     !(if *leaves { &lane.successors } else { &lane.predecessors }).is_empty()
                 };
-                // Lanes that come to the end need some that go on from there.
                 let (here, there) =
                     (self.driven_at(road_index, contact), self.driven_at(other, *other_contact));
                 // Lanes that come to the end need some that go on from there.

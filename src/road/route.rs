@@ -91,7 +91,7 @@ const PART_M: f64 = 0.2;
 /// A road with gentler slopes counts as level, as a part of the way. Ours: 2 % change a braking way at 6 m/s² by 3 %.
 pub const LEVEL_SLOPE_MAX: f64 = 0.02;
 
-/// Between two stations of a lane so far apart its slope is looked at, m.
+/// A slope is the change of height between two stations of a lane that are at most this far apart, m.
 const SLOPE_M: f64 = 10.0;
 
 impl Route {
@@ -105,6 +105,7 @@ impl Route {
             let step_m = (to_m - from_m) / steps;
             (0..steps as u32).map(move |nth| {
                 let at_m = from_m + step_m * f64::from(nth);
+                // On less than a metre a small step of height, as where two records meet, counts as no slope.
                 (lane.height_at(at_m + step_m) - lane.height_at(at_m)).abs() / step_m.max(1.0)
             })
         });

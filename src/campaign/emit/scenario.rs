@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::episode::{Breach, Collision, EpisodeLog, Outcome};
-use crate::oracle::{Found, MIXED, Recurrence};
+use crate::oracle::{Found, Recurrence, mixed_text};
 use crate::run::{EpisodeSummary, Finding};
 use avastra_base::units::Dimension;
 use avastra_drivers::external;
@@ -310,27 +310,20 @@ fn end(log: &EpisodeLog) -> Expect {
 
 /// What is found, in a sentence for the reader.
 fn headline_of(space: &Space, log: &EpisodeLog, summary: &EpisodeSummary, about: Found) -> String {
-    let (what, recurrence) = match about {
-        Found::Collision(index) => {
-            (headline(space, log, &log.collisions[index]), summary.collisions[index].recurrence)
-        }
+    let what = match about {
+        Found::Collision(index) => headline(space, log, &log.collisions[index]),
         Found::Breach(index) => {
             let breach = &log.breaches[index];
             let name = &space.requirements[breach.requirement].name;
-            let found = summary.breached.iter().find(|found| found.requirement == breach.requirement);
             let at_s = breach.time_s;
             let of = breach.obstacle.map_or(String::new(), |obstacle| format!(" of npc#{obstacle}"));
-            let what = format!("The ego vehicle does not keep `{name}`{of} at {at_s:.2} s on {}.", log.road);
-            (what, found.and_then(|found| found.recurrence))
+            format!("The ego vehicle does not keep `{name}`{of} at {at_s:.2} s on {}.", log.road)
         }
     };
     let program = log.conversation.as_deref().map(|conversation| &conversation.attached);
-    let mixed = match program.is_some_and(|attached| !attached.is_deterministic()) {
-        true => format!("; {MIXED}"),
-        false => String::new(),
-    };
+    let mixed = mixed_text(program.is_some_and(|attached| !attached.is_deterministic()));
     let again = |of| format!("{what} It recurs in {of} under other noise{mixed}.");
-    recurrence.map_or_else(|| what.clone(), again)
+    summary.recurrence_of(log, about).map_or_else(|| what.clone(), again)
 }
 
 fn capitalised(text: &str) -> String {

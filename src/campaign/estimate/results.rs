@@ -119,8 +119,8 @@ impl EstimateResults {
         let sample =
             |by_road, pilot_s| Sample { method: settings.method, by_road, pilot_s, missing: missing_at_look };
         let together = is_even.then(|| sample(&by_road, found.pilot_s).probability());
-        let is_over = |found: &&Probability| {
-            by_road.iter().map(Vec::len).sum::<usize>() == parts_wanted || settings.is_enough(found)
+        let is_over = |probability: &&Probability| {
+            found.records.len() == parts_wanted || settings.is_enough(probability)
         };
         EstimateResults {
             missed_goals: together

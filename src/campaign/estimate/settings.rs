@@ -225,28 +225,30 @@ impl EstimateSettings {
 
     /// Whether what was found so far is enough.
     pub fn is_enough(&self, found: &Probability) -> bool {
-        let Stopping { precision, hours } = self.stopping;
-        let half = found.interval.high.map(|high| (high - found.interval.low) / 2.0);
-        let is_precise = precision.zip(half).is_some_and(|(share, half)| half <= share * found.probability);
-        is_precise || hours.is_some_and(|hours| found.simulated_h >= hours)
+        self.is_precise(found) || self.stopping.hours.is_some_and(|hours| found.simulated_h >= hours)
+    }
+
+    /// Whether a precision was wanted, and is reached.
+    fn is_precise(&self, found: &Probability) -> bool {
+        let half = half_width(found);
+        self.stopping.precision.zip(half).is_some_and(|(share, half)| half <= share * found.probability)
     }
 
     /// Which goals were missed, in words, once nothing is left to play; none without goals.
-    pub fn missed_goals(&self, found: &Probability) -> Vec<String> {
+    pub(super) fn missed_goals(&self, found: &Probability) -> Vec<String> {
         let Stopping { precision, hours } = self.stopping;
-        let half = found.interval.high.map(|high| (high - found.interval.low) / 2.0);
-        let missed_precision = precision.and_then(|wanted| match half {
-            Some(half) if half <= wanted * found.probability => None,
+        // A precision that is reached stops it before.
+        if self.is_precise(found) {
+            return Vec::new();
+        }
+        let missed_precision = precision.map(|wanted| match half_width(found) {
             Some(half) if found.probability > 0.0 => {
                 let reached = half / found.probability;
-                Some(format!("a precision of {wanted} was wanted, {reached:.2} is reached"))
+                format!("a precision of {wanted} was wanted, {reached:.2} is reached")
             }
-            _ => Some(format!("a precision of {wanted} was wanted, and the event was never met")),
+            _ => format!("a precision of {wanted} was wanted, and the event was never met"),
         });
-        // A precision that is reached stops it before.
-        let is_precise = precision.is_some() && missed_precision.is_none();
-        let missed_hours = hours.filter(|&hours| !is_precise && found.simulated_h < hours);
-        let missed_hours = missed_hours.map(|hours| {
+        let missed_hours = hours.filter(|&hours| found.simulated_h < hours).map(|hours| {
             format!("{hours} h were wanted, {:.2} h were simulated in all parts", found.simulated_h)
         });
         missed_precision.into_iter().chain(missed_hours).collect()
@@ -272,4 +274,9 @@ impl EstimateSettings {
         }
         Ok(())
     }
+}
+
+/// Half of the width of the interval of a probability; `None` where it has no upper end.
+fn half_width(found: &Probability) -> Option<f64> {
+    found.interval.high.map(|high| (high - found.interval.low) / 2.0)
 }

@@ -49,11 +49,15 @@ impl Recurrence {
         proportion(self.recurred, self.replays).1
     }
 
-    /// For the reader: `recurs in 14 of 20 (0.48 to 0.85)`, with [`MIXED`] if it is.
-    pub fn in_words(self, is_mixed: bool) -> String {
-        let mixed = if is_mixed { format!("; {MIXED}") } else { String::new() };
-        format!("recurs in {self}{mixed}")
+    /// For the reader: `recurs in 14 of 20 (0.48 to 0.85)`.
+    pub fn in_words(self) -> String {
+        format!("recurs in {self}")
     }
+}
+
+/// What follows a text about recurrence where chance of the program is mixed in; nothing elsewhere.
+pub fn mixed_text(is_mixed: bool) -> String {
+    if is_mixed { format!("; {MIXED}") } else { String::new() }
 }
 
 /// With the 95 % interval of the share, after Wilson: `14 of 20 (0.48 to 0.85)`.
@@ -151,6 +155,8 @@ mod tests {
         );
         // The chance of the program itself clears nothing.
         assert_eq!(of(1, 20).word(true), "may recur");
-        assert_eq!(of(5, 20).in_words(true), format!("recurs in 5 of 20 (0.11 to 0.47); {MIXED}"));
+        let told = of(5, 20).in_words() + &mixed_text(true);
+        assert_eq!(told, format!("recurs in 5 of 20 (0.11 to 0.47); {MIXED}"));
+        assert_eq!(mixed_text(false), "");
     }
 }

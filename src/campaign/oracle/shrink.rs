@@ -250,11 +250,12 @@ impl<'a> Search<'a> {
 
     /// How often what is shrunk recurs.
     fn recurrence(&mut self) -> Recurrence {
+        if let Some(known) = self.recurrence {
+            return known;
+        }
         let Search { setup, ref whole, log, found, replays, .. } = *self;
-        let known = self.recurrence;
-        let recurrence = known
-            .unwrap_or_else(|| Replayed::new(setup, &whole.script, log, replays).recurrence(found, replays));
-        self.plays += if known.is_none() { replays } else { 0 };
+        let recurrence = Replayed::new(setup, &whole.script, log, replays).recurrence(found, replays);
+        self.plays += replays;
         self.recurrence = Some(recurrence);
         recurrence
     }

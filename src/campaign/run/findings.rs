@@ -1,7 +1,7 @@
 //! What a run found, by how sure and how bad it is.
 
 use core::cmp::Ordering;
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 
 use crate::oracle::Recurrence;
 use crate::run::database::{Database, from_columns};
@@ -36,7 +36,7 @@ impl FoundIn {
 
     /// In the terminal's list of scenarios: whose recurrence it is, and how bad it is.
     pub fn in_words(&self) -> String {
-        let again = self.recurrence.map(|of| of.in_words(false));
+        let again = self.recurrence.map(|of| of.in_words());
         let again = match self.harm {
             Some(_) => again,
             None => {
@@ -130,7 +130,7 @@ impl Database {
                UNION ALL SELECT episode, number, requirement, 1, recurred, replays, NULL, 0.0 FROM breach)
              SELECT road, episode, finding.counted, recurred, replays, harm, harm_share, name
              FROM finding JOIN episode USING (episode) ORDER BY episode, name IS NOT NULL, number";
-        let rows = query_all(&self.connection, query, |row| {
+        let mut found = query_all(&self.connection, query, |row| {
             let name: Option<String> = row.get(7)?;
             Ok(FoundIn {
                 road: row.get(0)?,
@@ -142,16 +142,10 @@ impl Database {
                 harm_share: row.get(6)?,
             })
         })?;
-        let mut found: BTreeMap<i64, FoundIn> = BTreeMap::new();
-        for one in rows {
-            let all = match found.remove(&one.episode) {
-                Some(known) if known.order(&one).is_le() => known,
-                Some(_) | None => one,
-            };
-            found.insert(all.episode, all);
-        }
-        let mut found: Vec<FoundIn> = found.into_values().collect();
+        // Of an episode with several findings the first in that order stands for it.
         found.sort_by(FoundIn::order);
+        let mut seen = BTreeSet::new();
+        found.retain(|one| seen.insert(one.episode));
         Ok(found)
     }
 }

@@ -97,6 +97,17 @@ impl EpisodeSummary {
         self.breached = oracle::breached(setup, &Script::of_log(log), log);
     }
 
+    /// How often a finding happens again, if that was tried.
+    pub fn recurrence_of(&self, log: &EpisodeLog, found: Found) -> Option<Recurrence> {
+        match found {
+            Found::Collision(index) => self.collisions[index].recurrence,
+            Found::Breach(index) => {
+                let requirement = log.breaches[index].requirement;
+                self.breached.iter().find(|found| found.requirement == requirement)?.recurrence
+            }
+        }
+    }
+
     /// What its scenario is about: the first counted collision, because a crash is more than a breach that led to it, or
     /// else the first breach.
     pub fn first_found(&self, log: &EpisodeLog) -> Option<Found> {

@@ -16,8 +16,8 @@
 //! | walk ahead, walk opposite | it appears beside the route where it was asked to, and walks along it that way |
 //! | stand | it stands on the route's path, or beside it where it was asked to |
 //!
-//! Nobody crashes into another one than the ego vehicle. Who is to be somewhere `early` is there within 0.5 s, if the ego vehicle keeps
-//! its speed until then.
+//! It crashes into no road user but the ego vehicle. One that is told to be at a place `early` is there within 0.5 s of that
+//! moment, if the ego vehicle keeps its speed until then.
 //!
 //! Somebody who is ordered gets to the speed, the lane and the place that it was told, or does all phases of its manoeuvre.
 //!
@@ -55,7 +55,7 @@ const OPPOSES_RAD: f64 = 3.0 * core::f64::consts::FRAC_PI_4;
 /// An oncoming vehicle that passes farther aside than this does not meet the ego vehicle, m.
 const MEETS_M: f64 = 12.0;
 
-/// Who misses the moment of an `early` by more than this is not where it was told to be then, s. Ours.
+/// A road user that misses the moment of an `early` by more than this fails the trial, s. Ours.
 const LATE_S: f64 = 0.5;
 
 /// How long a vehicle is watched, s.

@@ -33,7 +33,7 @@ pub struct TrialSettings {
     pub seed: u64,
 }
 
-/// Roads that are tried at the same time.
+/// Roads that are tried at the same time, at most. Ours: it bounds the threads.
 const ROADS_AT_ONCE: usize = 64;
 
 /// What the trials say of a row on a road.

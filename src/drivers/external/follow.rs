@@ -1,7 +1,7 @@
 //! From an answer to pedals and wheel: controls as they are, a trajectory by `modular`'s controllers, an acceleration
 //! with steering along the route.
 //!
-//! Who answers accelerations does not steer, so the lane changes of the route are made here: once there is room, by the rule of
+//! A driving system that answers with accelerations does not steer, so the lane changes of the route are made here: once there is room, by the rule of
 //! `idm`, and for as long as an indicator is on before. Other road users do not see that indicator: nothing in the world shows
 //! what the ego vehicle is about to do.
 
@@ -112,7 +112,8 @@ impl Follower {
         Control { throttle_pct: 0.0, brake_pct: LOST_BRAKE_PCT, steer_rad }
     }
 
-    /// Begins the next lane change of the route if it is time, there is room, and the driving system does not say otherwise.
+    /// Begins the next lane change of the route if it is time, there is room, and the driving system does not say otherwise. As
+    /// `modular`'s `LaneChanges::seek`, with the rule of `idm` for room.
     fn seek_room(&mut self, wanted: &AccelerationMessage, sensed: &Sensed) {
         let (station_m, speed_mps) = (self.helm.station_m(), sensed.ego.speed_mps);
         let Some(change) = self.changes.next() else { return };

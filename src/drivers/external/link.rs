@@ -71,7 +71,7 @@ impl Deadline {
         Deadline(now() + Duration::from_secs_f64(limit_s))
     }
 
-    /// How long ago it was so long before the deadline, s.
+    /// The time since a deadline of `limit_s` was set, s.
     pub fn taken_s(self, limit_s: f64) -> f64 {
         limit_s + now().saturating_duration_since(self.0).as_secs_f64() - self.left().as_secs_f64()
     }

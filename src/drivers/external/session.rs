@@ -129,15 +129,17 @@ impl Session {
                 true => Err(no_answer(format!(
                     "more than {LATE_MAX} answers of this episode came later than {limit_s} s (`timeouts.step`)"
                 ))),
-                false => self.answer(wanted, Some(seq), Deadline::after(GRACE_LIMITS * limit_s)),
+                false => {
+                    let more_s = GRACE_LIMITS * limit_s;
+                    let nor = || {
+                        no_answer(format!(
+                            "no answer within {limit_s} s (`timeouts.step`), nor in {more_s} s more"
+                        ))
+                    };
+                    let more = self.answer(wanted, Some(seq), Deadline::after(more_s));
+                    more.map_err(|broken| if broken.problem == Problem::NoAnswer { nor() } else { broken })
+                }
             };
-            found = found.map_err(|broken| match broken.problem {
-                Problem::NoAnswer if self.late <= LATE_MAX => no_answer(format!(
-                    "no answer within {limit_s} s (`timeouts.step`), nor in {} s more",
-                    GRACE_LIMITS * limit_s
-                )),
-                _ => broken,
-            });
         }
         let result = match found {
             Ok(answer) => {

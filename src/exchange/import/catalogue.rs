@@ -1,7 +1,7 @@
 //! Files that a scenario names: maps and catalogues. Each is read once, however many variations of the scenario there are.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 use avastra_road::RoadMap;
@@ -35,7 +35,7 @@ struct Entry {
     /// What is wrong with it; empty if nothing is.
     reason: String,
     /// What it says that is not read.
-    noted: Vec<String>,
+    noted: BTreeSet<String>,
     /// What its catalogue calls itself, if only its file has the name that was asked for.
     other_name: Option<String>,
 }
@@ -134,12 +134,7 @@ fn entry_in(text: &str, kinds: &[Kind], catalogue: &str, name: &str, is_by_file:
         .map_or(String::new(), |(node, reason)| format!("`{}`: {reason}", node.tag_name().name()));
     let own = list.attribute("name").unwrap_or("");
     let other_name = (own != catalogue).then(|| own.to_owned());
-    Some(Entry {
-        text: Rc::from(&text[found.range()]),
-        reason,
-        noted: noted.into_iter().collect(),
-        other_name,
-    })
+    Some(Entry { text: Rc::from(&text[found.range()]), reason, noted, other_name })
 }
 
 /// Notes the folders of catalogues.

@@ -24,8 +24,8 @@ pub const ARRIVES_M: f64 = 0.05;
 const TIMES_LATER: &str =
     "it moves, and its trajectory has times only from later on: where it is until then is not known";
 
-/// Times that differ by less are the same, s: a tick.
-const TICK_S: f64 = 0.05;
+/// Times of a trajectory that differ by less count as the same, s. Ours.
+const SAME_TIME_S: f64 = 0.05;
 
 const TIMES_OF_NO_BEGINNING: &str = "its times count from the beginning of the scenario, and when it begins is not known: `relative` ones are read";
 
@@ -261,8 +261,8 @@ impl<'c, 'a, 'e> Script<'c, 'a, 'e> {
             "its times begin {:.2} s before it does: where on its way it begins is not read",
             -wait_s
         );
-        source.refuse_if(wait_s < -TICK_S, mark, reason)?;
-        source.refuse_if(wait_s > TICK_S && self.told.mps != Some(0.0), mark, TIMES_LATER)?;
+        source.refuse_if(wait_s < -SAME_TIME_S, mark, reason)?;
+        source.refuse_if(wait_s > SAME_TIME_S && self.told.mps != Some(0.0), mark, TIMES_LATER)?;
         let mut begins = begins;
         if wait_s > 0.0 {
             begins = match is_absolute {

@@ -380,9 +380,8 @@ impl Cast {
         if self.others.iter().zip(&before).all(|(entity, from)| entity.events.len() == *from) {
             return;
         }
-        let Some(when) = conditions(source, stop).map(reduced) else { return };
         // What never comes stops nothing.
-        let Some(when) = when else { return };
+        let Some(when) = conditions(source, stop).and_then(reduced) else { return };
         let stop = Rc::new((source.mark(stop), when));
         for (entity, from) in self.others.iter_mut().zip(before) {
             entity.events[from..].iter_mut().for_each(|event| event.stop = Some(Rc::clone(&stop)));

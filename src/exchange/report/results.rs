@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use avastra_base::outside::in_markdown_cell;
 use avastra_campaign::study::{
     Agreement, BaselineComparison, ComparedFigure, ComparedPair, Departures, MeasuredAgent, MeasuredRoad,
     P_MAX, Played, PublishedTable, StudyFile, StudySettings, Verdict, measured_roads,
@@ -261,7 +262,7 @@ fn comparisons_text(measure: &str, question: &str, roads: &[&MeasuredRoad]) -> S
 /// A table in Markdown; all columns but the first are aligned right.
 fn table<'a>(head: impl IntoIterator<Item = &'a str>, rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let line = |cells: &[String]| {
-        let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
+        let cells: Vec<String> = cells.iter().map(|cell| in_markdown_cell(cell)).collect();
         format!("| {} |\n", cells.join(" | "))
     };
     let head: Vec<String> = head.into_iter().map(str::to_owned).collect();

@@ -143,7 +143,7 @@ fn order(old: &Side<'_>, new: &Side<'_>) -> Option<Difference> {
 }
 
 /// A declaration on one line.
-fn flat(text: &str) -> String {
+pub(super) fn flat(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 

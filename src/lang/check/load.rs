@@ -407,8 +407,10 @@ impl<'a> Loader<'a> {
             return Ok(());
         }
         let place = (self.files.len(), path.to_owned());
-        let known = self.known.as_ref().and_then(|known| known.get(&place).cloned());
-        let text = known.as_ref().map_or_else(|| (self.read)(path), |known| Ok(known.text.clone()))?;
+        let (text, parsed) = match self.known.as_ref().and_then(|known| known.get(&place).cloned()) {
+            Some(KnownFile { text, tree, diagnostics }) => (text, Some((tree, diagnostics))),
+            None => ((self.read)(path)?, None),
+        };
         self.words += words(&text);
         // The parser says it of a root that is too long by itself.
         if self.words > WORDS_MAX && !self.files.is_empty() {
@@ -417,10 +419,7 @@ impl<'a> Loader<'a> {
             return Err(ReadError(message));
         }
         let file = self.sources.add(path.to_string_lossy(), text);
-        let (tree, found) = match known {
-            Some(known) => (known.tree, known.diagnostics),
-            None => parse(file, self.sources.text(file)),
-        };
+        let (tree, found) = parsed.unwrap_or_else(|| parse(file, self.sources.text(file)));
         if let Some(known) = self.known.as_mut().filter(|known| place.0 > 0 && !known.contains_key(&place)) {
             let text = self.sources.text(file).to_owned();
             known.insert(place, KnownFile { text, tree: tree.clone(), diagnostics: found.clone() });

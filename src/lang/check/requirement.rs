@@ -1,6 +1,7 @@
 //! Requirements: what the ego vehicle must keep.
 
 use crate::check::checker::{Checker, docs};
+use crate::check::difference::flat;
 use crate::check::expression::Place;
 use crate::check::names::Names;
 use crate::check::references::Symbol;
@@ -116,7 +117,7 @@ impl Checker {
         Some(RequirementDef {
             name: declared.name.text.clone(),
             docs: docs(item),
-            formula: print_item(&item.kind).split_whitespace().collect::<Vec<_>>().join(" "),
+            formula: flat(&print_item(&item.kind)),
             optional: declared.optional,
             on: on.into_iter().collect::<Option<Vec<_>>>()?.concat(),
             margin: margin_dimension(&condition),

@@ -137,7 +137,7 @@ fn scenarios_are_read() {
     assert_eq!(scenario.claims.len(), 6);
 }
 
-/// A time is compared in the unit and to the decimals in which it is written.
+/// Files that are loaded one after another with the same [`KnownSpaces`] give what each gives alone.
 #[test]
 fn a_space_that_is_known_changes_nothing() {
     let space = format!("{BASE}{CLOCK}");
@@ -175,6 +175,7 @@ fn a_space_that_is_known_changes_nothing() {
     assert!(Arc::ptr_eq(&shared[0], &shared[1]), "the space was checked once");
 }
 
+/// A time is compared in the unit and to the decimals in which it is written.
 #[test]
 fn times_may_have_any_unit() {
     let space = format!("{BASE}{CLOCK}");

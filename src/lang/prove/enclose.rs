@@ -315,8 +315,8 @@ fn within(arm: &Expr, subject: &Expr, variants: u128, known: &Known<'_>) -> Valu
             ExprKind::Cell(cell) => cells[cell] = cells[cell].both(only),
             ExprKind::Fact(fact) => {
                 let before = enclose(name, &Known { case: Some(&case), ..*known });
-                if let (Values::Number(piece), true) = (before.both(only), fact.ty() != Type::Bool) {
-                    case = case.with_number(fact, piece);
+                if let Values::Number(piece) = before.both(only) {
+                    case.set_number(fact, piece);
                 }
             }
             _ => {}

@@ -51,11 +51,9 @@ impl Case {
         Case { numbers: vec![(Fact::Elapsed, elapsed), (Fact::StepNumber, steps)], ..Case::default() }
     }
 
-    /// The same case, in which a fact is such a number.
-    pub fn with_number(&self, fact: Fact, piece: Interval) -> Case {
-        let mut case = self.clone();
-        case.numbers.insert(0, (fact, piece));
-        case
+    /// From here on a fact is such a number: of several entries the first holds.
+    pub fn set_number(&mut self, fact: Fact, piece: Interval) {
+        self.numbers.insert(0, (fact, piece));
     }
 
     pub fn number(&self, fact: Fact) -> Option<Interval> {

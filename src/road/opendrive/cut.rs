@@ -2,7 +2,7 @@
 //!
 //! A section without such a change stays as it is.
 
-use super::elements::{LaneElement, Limit, SectionElement, TypeElement};
+use super::elements::{Holds, LaneElement, Limit, SectionElement, TypeElement};
 use super::xml::wrong;
 use crate::RoadError;
 
@@ -11,14 +11,6 @@ const PIECE_M_MIN: f64 = 1.0;
 
 /// Limit on the lanes that the sections of a map are cut into: a record of a few bytes cuts all lanes of a road.
 const LANES_MAX: usize = 1_000_000;
-
-/// What holds on a lane.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Holds {
-    limit: Limit,
-    is_motorway: bool,
-    for_buses: bool,
-}
 
 /// Cuts the sections of a road, and notes on each lane what holds on it.
 ///
@@ -35,7 +27,7 @@ pub fn cut(
         let last = pieces.len() - 1;
         if last == 0 {
             let (_, _, held) = pieces.remove(0);
-            section.lanes.iter_mut().zip(held).for_each(|(lane, held)| held.note_on(lane));
+            section.lanes.iter_mut().zip(held).for_each(|(lane, held)| lane.holds = held);
             all.push(section);
             continue;
         }
@@ -49,7 +41,7 @@ pub fn cut(
         for (nth, (from_m, to_m, held)) in pieces.into_iter().enumerate() {
             let lanes = section.lanes.iter().zip(held).map(|(lane, held)| {
                 let mut piece = lane.between(from_m - section.begin_m, to_m - section.begin_m);
-                held.note_on(&mut piece);
+                piece.holds = held;
                 if nth > 0 {
                     piece.predecessors = vec![lane.id];
                 }
@@ -62,12 +54,6 @@ pub fn cut(
         }
     }
     Ok(all)
-}
-
-impl Holds {
-    fn note_on(self, lane: &mut LaneElement) {
-        (lane.limit, lane.is_motorway, lane.for_buses) = (self.limit, self.is_motorway, self.for_buses);
-    }
 }
 
 /// From, to, and what holds on each lane in between.

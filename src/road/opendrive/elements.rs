@@ -79,16 +79,27 @@ pub struct SectionElement {
     pub lanes: Vec<LaneElement>,
 }
 
+/// What holds on a lane: its limit, whether its road is a motorway, and whether it is for buses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Holds {
+    pub limit: Limit,
+    pub is_motorway: bool,
+    pub for_buses: bool,
+}
+
+impl Holds {
+    /// Nothing is known yet.
+    pub const UNKNOWN: Holds = Holds { limit: Limit::Unstated, is_motorway: false, for_buses: false };
+}
+
 #[derive(Debug, Clone)]
 pub struct LaneElement {
     pub id: i32,
     pub line: u32,
     /// Why no car drives on it, in one direction; `None` for a driving lane.
     pub undriven: Option<LeftOut>,
-    /// What holds on it, as `cut` finds: its limit, whether its road is a motorway, and whether it is for buses.
-    pub limit: Limit,
-    pub is_motorway: bool,
-    pub for_buses: bool,
+    /// What holds on it; unknown until `cut` has found it.
+    pub holds: Holds,
     /// What a lane that is no driving lane is to people on foot.
     pub beside: Option<StripKind>,
     /// Width over the distance from the section's begin.
@@ -226,9 +237,7 @@ impl LaneElement {
             id: self.id,
             line: self.line,
             undriven: self.undriven.clone(),
-            limit: self.limit,
-            is_motorway: self.is_motorway,
-            for_buses: self.for_buses,
+            holds: self.holds,
             beside: self.beside,
             widths: self.widths.between(from_m, to_m),
             borders: self.borders.between(from_m, to_m),

@@ -76,7 +76,6 @@ const NOTED: &str = "
 
 /// What a map says that may change what it means and is not read, in words, each as often as it stands there.
 pub fn unread<'a>(root: Node<'a, '_>) -> impl Iterator<Item = String> + 'a {
-    let elements: BTreeSet<&str> = NOTED.split_whitespace().collect();
     let mut attributes: BTreeMap<(&str, &str), Vec<&str>> = BTreeMap::new();
     for row in ELEMENTS.split(';') {
         let Some((element, rest)) = row.trim().split_once(" [") else { continue };
@@ -85,7 +84,8 @@ pub fn unread<'a>(root: Node<'a, '_>) -> impl Iterator<Item = String> + 'a {
         let Some(key) = element.split_once('.').filter(|_| !noted.is_empty()) else { continue };
         attributes.insert(key, noted);
     }
-    let elements: BTreeSet<(&str, &str)> = elements.iter().filter_map(|name| name.split_once('.')).collect();
+    let elements: BTreeSet<(&str, &str)> =
+        NOTED.split_whitespace().filter_map(|name| name.split_once('.')).collect();
     root.descendants().filter(Node::is_element).flat_map(move |node| {
         let name = node.tag_name().name();
         let parent = node.parent_element().map_or("", |parent| parent.tag_name().name());

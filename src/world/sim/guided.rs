@@ -65,13 +65,23 @@ struct Meeting {
     /// For how long a way before the place it has it already, m.
     steady_m: f64,
     stage: Stage,
-    /// How fast the ego vehicle was at first, m/s; NaN once it has not kept that.
-    ego_mps: Option<f64>,
+    ego_keeps: EgoKeeps,
 }
 
-/// Whether the ego vehicle keeps a speed, m/s, as whoever is to meet it takes it to do: within a tenth and half a metre per second.
-pub(super) fn keeps_speed(first_mps: f64, now_mps: f64) -> bool {
-    (now_mps - first_mps).abs() <= 0.1 * first_mps + 0.5
+/// Whether the ego vehicle has kept the speed that it had at the first look, within a tenth and half a metre per second.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct EgoKeeps {
+    first_mps: Option<f64>,
+    is_lost: bool,
+}
+
+impl EgoKeeps {
+    /// Whether it has, up to now. One that is slower than `standing_mps` has not.
+    pub fn look(&mut self, now_mps: f64, standing_mps: f64) -> bool {
+        let first_mps = *self.first_mps.get_or_insert(now_mps);
+        self.is_lost |= now_mps < standing_mps || (now_mps - first_mps).abs() > 0.1 * first_mps + 0.5;
+        !self.is_lost
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -93,7 +103,7 @@ impl Meeting {
             mps: command.speed_mps,
             steady_m: command.steady_m.unwrap_or(0.0),
             stage: Stage::Adapting,
-            ego_mps: None,
+            ego_keeps: EgoKeeps::default(),
         })
     }
 
@@ -107,9 +117,7 @@ impl Meeting {
         around: &Around,
     ) -> Option<f64> {
         let ego_mps = around.ego.speed_mps;
-        let first_mps = *self.ego_mps.get_or_insert(ego_mps);
-        if ego_mps < STANDING_MPS || !keeps_speed(first_mps, ego_mps) {
-            self.ego_mps = Some(f64::NAN);
+        if !self.ego_keeps.look(ego_mps, STANDING_MPS) {
             return None;
         }
         let ego_m = self.ego_m - VehicleParameters::MKZ.front_m(around.ego_station_m);
@@ -290,8 +298,9 @@ impl Guided {
             }
             match meeting.speed_mps(self.station_m, self.speed_mps, around) {
                 Some(speed_mps) => {
-                    let range_mps = before_mps - loses_mps2 * DT_S..=before_mps + gains_mps2 * DT_S;
-                    self.speed_mps = speed_mps.clamp(*range_mps.start(), *range_mps.end());
+                    let (least_mps, most_mps) =
+                        (before_mps - loses_mps2 * DT_S, before_mps + gains_mps2 * DT_S);
+                    self.speed_mps = speed_mps.clamp(least_mps, most_mps);
                 }
                 None => {
                     self.wants_mps = meeting.mps.unwrap_or(self.speed_mps);
@@ -372,8 +381,8 @@ impl Guided {
         if let Some(Shift { from_m, to_m, takes_s, since_s }) = *shift {
             trace.numbers([from_m, to_m, takes_s, since_s]);
         }
-        // No tick reads how fast the ego vehicle was.
-        if let Some(Meeting { ego_m, early_s, reach_m, mps, steady_m, stage, ego_mps: _ }) = *meeting {
+        // What the ego vehicle has kept moves nothing: only `late_s` comes of it.
+        if let Some(Meeting { ego_m, early_s, reach_m, mps, steady_m, stage, ego_keeps: _ }) = *meeting {
             trace.word(stage as u64);
             trace.numbers([ego_m, early_s, reach_m, mps.unwrap_or(f64::INFINITY), steady_m]);
         }

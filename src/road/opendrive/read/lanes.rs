@@ -2,7 +2,7 @@
 
 use crate::{LeftOut, RoadError, StripKind};
 
-use super::super::elements::{LaneElement, Limit, MarkElement, MarkRule, SectionElement};
+use super::super::elements::{Holds, LaneElement, MarkElement, MarkRule, SectionElement};
 use super::super::xml::{Element, wrong};
 use super::{Reader, cubics};
 
@@ -96,9 +96,7 @@ impl Reader {
             id,
             line: lane.line(),
             undriven,
-            limit: Limit::Unstated,
-            is_motorway: false,
-            for_buses: false,
+            holds: Holds::UNKNOWN,
             buses,
             beside,
             widths,

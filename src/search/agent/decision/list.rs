@@ -139,15 +139,7 @@ fn lines(tree: &Tree) -> Vec<PolicyRule> {
 }
 
 fn opposite(condition: &Condition) -> Condition {
-    let comparison = match condition.comparison {
-        Comparison::Equal => Comparison::NotEqual,
-        Comparison::NotEqual => Comparison::Equal,
-        Comparison::Less => Comparison::GreaterEqual,
-        Comparison::LessEqual => Comparison::Greater,
-        Comparison::Greater => Comparison::LessEqual,
-        Comparison::GreaterEqual => Comparison::Less,
-    };
-    Condition { comparison, ..*condition }
+    Condition { comparison: condition.comparison.negated(), ..*condition }
 }
 
 /// Leaves out what another test implies: of two tests of a variable in one direction, the later is narrower.

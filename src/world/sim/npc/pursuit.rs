@@ -9,7 +9,7 @@ use avastra_road::LaneIndex;
 use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
-use crate::sim::guided::keeps_speed;
+use crate::sim::guided::EgoKeeps;
 use crate::sim::road_user::Obstacle;
 use crate::sim::trace::Trace;
 use crate::sim::world::DT_S;
@@ -38,8 +38,7 @@ pub(super) struct Pursuit {
     is_met: bool,
     /// By how much it misses its moment if both go on as they do, s; `None` if the ego vehicle has not kept its speed.
     late_s: Option<f64>,
-    /// How fast the ego vehicle was at first, m/s; NaN once it has not kept that.
-    ego_mps: Option<f64>,
+    ego_keeps: EgoKeeps,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -79,13 +78,13 @@ impl Pursuit {
             crosses_in: None,
             is_met: false,
             late_s: None,
-            ego_mps: None,
+            ego_keeps: EgoKeeps::default(),
         })
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        // No tick reads by how much it is late.
-        let Pursuit { aim, speed_mps_max, crosses_in, is_met, late_s: _, ego_mps: _ } = *self;
+        // By how much it is late moves nothing.
+        let Pursuit { aim, speed_mps_max, crosses_in, is_met, late_s: _, ego_keeps: _ } = *self;
         let (kind, to, numbers) = match aim {
             Aim::Gap(Gap::Way(gap_m), to) => (0, to, [gap_m, 0.0]),
             Aim::Gap(Gap::Time(gap_s), to) => (1, to, [gap_s, 0.0]),
@@ -175,11 +174,7 @@ impl Driver {
                 let left_s = ego_m / around.ego.speed_mps - early_s;
                 // The ego vehicle has moved in this tick already.
                 let left_s = left_s + DT_S;
-                let first_mps = pursuit.ego_mps.get_or_insert(around.ego.speed_mps);
-                if around.ego.speed_mps < STANDING_MPS || !keeps_speed(*first_mps, around.ego.speed_mps) {
-                    *first_mps = f64::NAN;
-                }
-                let is_kept = !first_mps.is_nan();
+                let is_kept = pursuit.ego_keeps.look(around.ego.speed_mps, STANDING_MPS);
                 pursuit.late_s = is_kept.then(|| own_m / self.speed_mps.max(STANDING_MPS) - left_s);
                 let needed_mps = if left_s > DT_S { own_m / left_s } else { f64::INFINITY };
                 (needed_mps.min(speed_mps_max) - self.speed_mps) / TAKES_S
