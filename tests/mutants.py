@@ -3,7 +3,7 @@
 
     python3 tests/mutants.py judging            lists how many changes there are
     python3 tests/mutants.py judging 1 120      tries 120 of them, chosen by seed 1
-    python3 tests/mutants.py judging 1 120 --again 12,40      tries two of those again
+    python3 tests/mutants.py judging 1 120 --again 12,40    tries two of those again
 
 `judging` is priority, kinds, avoidability, `counted`, shrinking and the monitor of requirements; `rules` is what solves, judges
 and proves rules. The changes are those of `cargo mutants --list` (`cargo install cargo-mutants`). All that are chosen are built
@@ -13,6 +13,7 @@ compile there is replaced by the next one of the lot, and the last line says how
 """
 
 import argparse
+import hashlib
 import json
 import os
 import random
@@ -20,31 +21,38 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
 import time
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from fnmatch import fnmatch
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 COPY = ROOT / "target/mutants/tree"
 TARGET = ROOT / "target/mutants/target"
-#: Of each subject: its files; the crates whose unit tests belong to it; and those of `tests/it` that do.
+#: Names of changes that do not compile beside the others, with their files' texts.
+REFUSED = ROOT / "target/mutants/refused.json"
+#: Of each subject: files; the crates whose unit tests belong to them; and those of `tests/it` that do.
 SUBJECTS = {
-    "judging": (
-        ["src/world/sim/right_of_way.rs", "src/world/sim/right_of_way/*.rs"]
-        + [f"src/campaign/episode/{name}.rs" for name in ("precrash", "monitor")]
-        + [f"src/campaign/oracle/{name}.rs" for name in ("avoidable", "counted", "shrink")],
-        ["avastra-world", "avastra-campaign"],
-        ["situations::", "verdicts::", "requirements::", "suites::", "r157::", "emitted::"],
-    ),
-    "rules": (
-        ["src/lang/model/rules/*.rs", "src/lang/model/memory.rs", "src/world/action/draw.rs"]
-        + [f"src/lang/check/{name}.rs" for name in ("rule", "scenario_rules")]
-        + [f"src/lang/prove/{name}.rs" for name in ("reach", "realise", "time", "moment", "witness")],
-        ["avastra-lang", "avastra-world"],
-        ["cases::", "rules::", "language::", "wishes::"],
-    ),
+    "judging": [
+        (["src/world/sim/right_of_way.rs", "src/world/sim/right_of_way/*.rs"],
+         ["avastra-world", "avastra-campaign"], ["situations::", "verdicts::", "pedestrians::"]),
+        ([f"src/campaign/{name}.rs" for name in ("episode/precrash", "oracle/avoidable", "oracle/counted")],
+         ["avastra-campaign"], ["situations::", "verdicts::", "r157::"]),
+        (["src/campaign/episode/monitor.rs"], ["avastra-campaign"], ["situations::", "requirements::"]),
+        (["src/campaign/oracle/shrink.rs"], ["avastra-campaign"], ["failures::", "sureness::"]),
+    ],
+    "rules": [
+        (["src/lang/model/rules/*.rs", "src/lang/model/memory.rs", "src/world/action/draw.rs"],
+         ["avastra-lang", "avastra-world"], ["cases::", "rules::"]),
+        ([f"src/lang/{name}.rs" for name in ("check/rule", "check/scenario_rules", "prove/reach", "prove/realise", "prove/time",
+                                             "prove/moment", "prove/witness")],
+         ["avastra-lang", "avastra-world"], ["cases::", "language::"]),
+    ],
 }
+#: What all crates use has the switch.
+BASE = "src/base/lib.rs"
 SWITCH = """
 /// Which change of `tests/mutants.py` runs; 0 is none.
 pub fn mutant() -> u32 {
@@ -61,19 +69,21 @@ def listed(patterns):
     return json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, check=True, text=True).stdout)
 
 
-def copy_checkout():
-    """Brings the copy to the state of the checkout, touching what differs alone."""
+def copy_checkout(changed):
+    """Brings the copy to the state of the checkout, touching what differs alone; `changed` are files that are written with changes."""
     names = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, check=True, text=True).stdout.splitlines()
-    for name in names:
+    for name in set(names) - changed:
         source, copy = ROOT / name, COPY / name
         if source.is_file() and not (copy.is_file() and copy.read_bytes() == source.read_bytes()):
             copy.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(source, copy)
 
 
-def at(lines, place):
-    """The index of a place in the text whose lines are given with their ends."""
-    return sum(map(len, lines[: place["line"] - 1])) + place["column"] - 1
+def write(path, text):
+    """Writes a file, unless it has that text: cargo goes by times."""
+    if not path.exists() or path.read_text() != text:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
 
 
 class File:
@@ -81,6 +91,7 @@ class File:
 
     def __init__(self, name):
         self.name, self.text = name, (ROOT / name).read_text()
+        self.digest = hashlib.sha256(self.text.encode()).hexdigest()
         lines = self.text.splitlines(keepends=True)
         self.starts = [0]
         for line in lines:
@@ -120,9 +131,7 @@ class File:
             if change:
                 self.lines.append((line, line + piece.count("\n"), change))
             line += piece.count("\n")
-        written = "".join(piece for _, piece in pieces)
-        if (COPY / self.name).read_text() != written:
-            (COPY / self.name).write_text(written)
+        write(COPY / self.name, "".join(piece for _, piece in pieces))
 
     def change_at(self, line):
         return next((change for first, last, change in self.lines if first <= line <= last), None)
@@ -151,17 +160,16 @@ def refused(messages, files):
 
 def build(lot, count, packages):
     """Builds as many changes of the lot as are asked for; gives them, how many did not compile, and the test programs."""
-    base = COPY / "src/base/lib.rs"
-    base.write_text((ROOT / "src/base/lib.rs").read_text() + SWITCH)
-    files, chosen, dropped = {}, {}, 0
+    write(COPY / BASE, (ROOT / BASE).read_text() + SWITCH)
+    files, chosen, dropped = {name: File(name) for name in {change["file"] for change in lot}}, {}, 0
+    known = json.loads(REFUSED.read_text()) if REFUSED.exists() else {}
     checked = [part for package in packages for part in ("-p", package)]
     while True:
         while len(chosen) < count and lot:
             change = lot.pop()
             change["number"] = len(chosen) + dropped + 1
-            file = files.setdefault(change["file"], None) or File(change["file"])
-            files[change["file"]] = file
-            if file.body(change) is None:
+            file = files[change["file"]]
+            if file.body(change) is None or known.get(change["name"]) == file.digest:
                 dropped += 1
             else:
                 chosen[change["number"]] = change
@@ -173,8 +181,10 @@ def build(lot, count, packages):
         out = refused(messages, files)
         if not out:
             sys.exit(f"the copy does not compile:\n{done.stderr[-3000:]}")
-        for number in out:
+        for number, change in out.items():
+            known[change["name"]] = files[change["file"]].digest
             del chosen[number]
+        REFUSED.write_text(json.dumps(known))
         dropped += len(out)
     done, messages = cargo("test", "--no-run", "--workspace", "--exclude", "avastra-python")
     if done.returncode != 0:
@@ -184,26 +194,34 @@ def build(lot, count, packages):
     return list(chosen.values()), dropped, programs
 
 
-def stages(programs, packages, names):
+def stages(programs, crates, names):
     """Commands that a change must make fail, and the folders that they run in."""
     units = {name: program for (_, name), program in programs.items()}
-    folders = {package: COPY / "src" / package.removeprefix("avastra-") for package in packages}
-    commands = [(folders[package], [units[package.replace("-", "_")]]) for package in packages]
-    return [*commands, (COPY, [units["it"], *names])]
+    of_crates = [(COPY / "src" / crate.removeprefix("avastra-"), [units[crate.replace("-", "_")]]) for crate in crates]
+    return of_crates + [(COPY, [units["it"], name]) for name in names]
 
 
 def played(commands, number, limits):
-    """`caught` by which command, `endless`, or `survived`."""
-    for index, (folder, command) in enumerate(commands):
-        variables = os.environ | {"MUTANT": str(number), "INSTA_UPDATE": "no", "RUST_TEST_THREADS": "1", "CARGO_MANIFEST_DIR": str(folder)}
-        try:
-            done = subprocess.run(command, cwd=folder, env=variables, capture_output=True, timeout=limits[index], check=False)
-        except subprocess.TimeoutExpired:
-            return "endless", index, ""
-        if done.returncode != 0:
-            failed = re.findall(r"^test (\S+) .*FAILED", done.stdout.decode(errors="replace"), re.M)
-            return "caught", index, failed[0] if failed else f"status {done.returncode}"
-    return "survived", None, ""
+    """`caught` and by which test, `endless`, or `survived`."""
+    for (folder, command), limit in zip(commands, limits):
+        variables = os.environ | {"MUTANT": str(number), "INSTA_UPDATE": "no", "RUST_TEST_THREADS": "1"}
+        settings = {"cwd": folder, "env": variables, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True, "errors": "replace"}
+        with subprocess.Popen(command, **settings) as tests:
+            clock = threading.Timer(limit, tests.kill)
+            clock.start()
+            # The first failure is enough.
+            failed = next((line for line in tests.stdout if re.match(r"test .*FAILED", line)), None)
+            is_late = not clock.is_alive()
+            clock.cancel()
+            if failed is not None:
+                tests.kill()
+        if failed is not None:
+            return "caught", failed.split()[1]
+        if is_late:
+            return "endless", f"{limit:.0f} s"
+        if tests.returncode != 0:
+            return "caught", f"status {tests.returncode}"
+    return "survived", ""
 
 
 def main():
@@ -214,29 +232,39 @@ def main():
     arguments.add_argument("--jobs", type=int, default=2)
     arguments.add_argument("--again", help="numbers of changes that alone are tried")
     given = arguments.parse_args()
-    patterns, packages, names = SUBJECTS[given.subject]
-    lot = listed(patterns)
-    print(f"{len(lot)} changes in {len({change['file'] for change in lot})} files", flush=True)
+    groups = SUBJECTS[given.subject]
+    lot = listed([pattern for patterns, _, _ in groups for pattern in patterns])
+    files = {change["file"] for change in lot}
+    print(f"{len(lot)} changes in {len(files)} files", flush=True)
     if given.seed is None:
         return
     random.Random(given.seed).shuffle(lot)
-    copy_checkout()
-    changes, dropped, programs = build(lot, given.count, packages)
-    commands = stages(programs, packages, names)
-    limits = []
-    for index, command in enumerate(commands):
-        begin = time.monotonic()
-        outcome = played([command], 0, [900])
-        if outcome[0] != "survived":
-            sys.exit(f"without a change, a test fails: {outcome}")
-        limits.append(4 * (time.monotonic() - begin) + 20)
-    print("tests take " + ", ".join(f"{(limit - 20) / 4:.0f} s" for limit in limits), flush=True)
+    copy_checkout({*files, BASE})
+    crates = sorted({crate for _, crates, _ in groups for crate in crates})
+    changes, dropped, programs = build(lot, given.count, crates)
     if given.again:
         changes = [change for change in changes if str(change["number"]) in given.again.split(",")]
+    took = {}
+    for _, crates, names in groups:
+        for folder, command in stages(programs, crates, names):
+            if tuple(command) not in took:
+                begin = time.monotonic()
+                outcome = played([(folder, command)], 0, [900])
+                if outcome[0] != "survived":
+                    sys.exit(f"without a change, a test fails: {outcome}")
+                took[tuple(command)] = time.monotonic() - begin
+    print("tests take " + ", ".join(f"{seconds:.0f} s" for seconds in took.values()), flush=True)
+
+    def tried(change):
+        belongs = (group for group in groups if any(fnmatch(change["file"], pattern) for pattern in group[0]))
+        _, crates, names = next(belongs)
+        commands = stages(programs, crates, names)
+        return change, *played(commands, change["number"], [4 * took[tuple(command)] + 20 for _, command in commands])
+
     counts = Counter()
     with ThreadPoolExecutor(given.jobs) as pool:
-        outcomes = pool.map(lambda change: played(commands, change["number"], limits), changes)
-        for change, (outcome, _, by) in zip(changes, outcomes):
+        for done in as_completed([pool.submit(tried, change) for change in changes]):
+            change, outcome, by = done.result()
             counts[outcome] += 1
             print(f"{outcome:8} {change['number']:3} {change['name']}   {by}", flush=True)
     print(f"{dict(counts)}; {dropped} did not compile beside the others")

@@ -199,12 +199,17 @@ fn play_all(
     if !kept.is_empty() {
         let kept = plural(kept.len(), "episode");
         output.say(&format!(
-            "{kept} without a finding, the nearest misses first, in {}/kept",
+            "{kept} without a finding in {}/kept: first those with a collision that does not count, then the nearest misses",
             directory.path.shown()
         ));
     }
-    if critical.is_empty() && kept.is_empty() && is_over && !is_protocol {
-        output.say("next: `--keep 3` keeps the nearest misses; other roads may find more");
+    if kept.is_empty() && is_over && !is_protocol {
+        let nearest = directory.read(|database| database.near(1))?;
+        if nearest.iter().any(|near| near.collision.is_some()) {
+            output.say("next: `--keep 3` keeps episodes whose collisions do not count, to look at");
+        } else if critical.is_empty() {
+            output.say("next: `--keep 3` keeps the nearest misses; other roads may find more");
+        }
     }
     let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {

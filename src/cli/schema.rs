@@ -129,7 +129,7 @@ run
   tests[] object of `every-row`: an action that was carried out, or that was refused (why is `refused`; without an `ending`): `episode`, `road`, `action`, its `values`, its `ending` (`avoided`, `near`, `mitigated`, `hit`, `others_crashed`), speeds before and at the first contact (m/s) and its `precrash` type, the least `ttc_s`, whether a collision is `counted`, what was `breached`, whether other road users crashed into each other (`others_crashed`)
   tables[] text of `every-row`: the same as CSV and as JUnit XML
   thinking object? of a driving system of your own that was asked: `answers`, seconds by the wall clock (`median_s`, `most_of_99_s`, `most_s`), the share `beyond_period`, how many were `late`
-  kept[] text with `--keep`: paths of episodes without a finding, the nearest misses first
+  kept[] text with `--keep`: paths of episodes without a finding: with a collision that does not count, then the nearest misses
   failures[] object what went wrong with a driving system of your own: `kind`, `problem`, `times`, `detail`, `scenario`
   REPRODUCIBLE
 ads check
@@ -243,7 +243,7 @@ shrink
   median_steps number
   median_actions number
   kept number scenarios that keep their verdict and every claim
-  scenarios[] object `file`, `output`, steps and actions before and after, what was kept and traded (`worth_before`, `worth`), claims `refuted`
+  scenarios[] object `file`, `output`, steps and actions before and after, what was kept and traded (`worth_before`, `worth`, the `requirement` of a breach), claims `refuted`
   REPRODUCIBLE
   FAILED
 test

@@ -88,6 +88,8 @@ struct Small {
     actions_left: Vec<String>,
     /// What was kept and what was traded, before and after.
     worth: [Worth; 2],
+    /// The requirement that is breached still, if the finding is a breach.
+    requirement: Option<String>,
     /// Whether the driving system need not repeat itself.
     is_mixed: bool,
     plays: u32,
@@ -117,14 +119,18 @@ impl Small {
             _ => "the other first",
         };
         let harm = after.harm.map(|harm| format!("{harm} harm"));
-        let kept =
-            [after.kind.map(str::to_owned), harm, after.priority.map(|priority| first(priority).to_owned())];
+        let kept = [
+            self.requirement.as_ref().map(|name| format!("`{name}` is breached")),
+            after.kind.map(str::to_owned),
+            harm,
+            after.priority.map(|priority| first(priority).to_owned()),
+        ];
         let kept: Vec<String> = kept.into_iter().flatten().collect();
-        let kept = (!kept.is_empty()).then(|| format!("kept: {}", kept.join(", ")));
-        let moved = |what: &str, unit: &str, pair: Option<(f64, f64)>| {
-            pair.map(|(before, after)| format!("{what} {before:.1} → {after:.1}{unit}"))
-        };
-        let kmh = |of: &Worth| of.impact_mps.map(|mps| 3.6 * mps);
+        let impact = before
+            .impact_mps
+            .zip(after.impact_mps)
+            .map(|(before, after)| format!("impact {:.1} → {:.1} km/h", 3.6 * before, 3.6 * after));
+        let margin = before.margin.zip(after.margin);
         let again = match (before.recurrence, after.recurrence) {
             (Some(before), Some(after)) => {
                 format!("recurs in {before} → {after}{}", mixed_text(self.is_mixed))
@@ -132,9 +138,9 @@ impl Small {
             _ => "how often it recurs was not tried, because the file does not claim it".to_owned(),
         };
         let told = [
-            kept,
-            moved("impact", " km/h", kmh(before).zip(kmh(after))),
-            moved("margin", "", before.margin.zip(after.margin)),
+            Some(format!("kept: {}", kept.join(", "))),
+            impact,
+            margin.map(|(before, after)| format!("margin {before:.2} → {after:.2}")),
             Some(again),
         ];
         told.into_iter().flatten().collect::<Vec<_>>().join("; ")
@@ -145,6 +151,7 @@ impl Small {
         serde_json::json!({
             "worth_before": before, "worth": after,
             "file": self.file, "output": self.path, "scenario": self.scenario,
+            "requirement": self.requirement,
             "steps_before": self.before.0, "actions_before": self.before.1,
             "steps": self.after.0, "actions": self.after.1,
             "plays": self.plays, "refuted": self.refuted,
@@ -234,6 +241,13 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
         Outcome::Done { draw, .. } => Some(emit::action_text(&table, draw)),
         Outcome::Passed | Outcome::Refused { .. } => None,
     });
+    let requirement = match shrunk.found {
+        Found::Breach(index) => {
+            let breach = &shrunk.log.breaches[index];
+            Some(table.space().requirements[breach.requirement].name.to_string())
+        }
+        Found::Collision(_) => None,
+    };
     Ok(Small {
         file: file.to_owned(),
         path: path.to_owned(),
@@ -242,6 +256,7 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
         after: size(&shrunk.script),
         actions_left: actions.collect(),
         worth,
+        requirement,
         is_mixed: ads.program().is_some_and(|program| !program.is_deterministic()),
         plays: shrunk.plays,
         refuted: refuted(output, path, &ads)?,

@@ -1,6 +1,7 @@
 """What does avastra find in planners that have one defect each? The ten defects of `DEFECTS`, and a sane planner as the control.
 
     python3 tests/interop/defects.py AVASTRA [DEFECT…]      # all without DEFECT; those that are not known are named
+    python3 tests/interop/defects.py AVASTRA --faults       # the planted faults of scenarios/ads/faults, by the same measure
     python3 tests/interop/defects.py --drive DEFECT         # serves the planner, for `avastra run --ads` of your own
 
 Each planner drives 100 episodes of `avastra45_law.ava` and 100 of `manoeuvres.ava`, 25 on each road. For each it is printed which
@@ -8,6 +9,9 @@ requirements it breached, in how many episodes and by how much, and which kinds 
 typology). FOUND means that what was expected of the defect is among them, in more episodes than in the control where that is played, too.
 `latency` drives one episode only, since it wastes the wall clock: it is found if 1 % of its answers or more take longer than the period. What is not found fails
 nothing: the last line names it. Takes some ten minutes on two processors. The runs are left in target/interop/defects, or in the folder $OUT.
+
+With `--faults` each planted fault drives 40 episodes on each road of three spaces. One that hits somebody has to have a counted collision
+or a breach; the last line names those that have none.
 
 The planner is told the truth (`observation: truth`), so that what is found is its own doing. It knows only what it has seen once. avastra
 steers (`answer: acceleration`), but for `changes_blindly`, which turns the wheel itself.
@@ -451,14 +455,35 @@ def is_found(defect, told, control):
             or sum(counted[number] for number in numbers) > sum(before[1][number] for number in numbers))
 
 
+def play_faults(program, out):
+    """Collisions and findings of each planted fault; names those that hit somebody and have no finding."""
+    missed = []
+    for fault in sorted((ROOT / "scenarios/ads/faults").glob("*.yaml")):
+        hits = found = 0
+        for space in [*SPACES.values(), "scenarios/r157.ava"]:
+            folder = out / fault.stem
+            shutil.rmtree(folder, ignore_errors=True)
+            told = json.loads(subprocess.run(
+                [program, "run", space, "--ads", fault, "--episodes", "40", "--seed", "7", "--replays", "0", "--out", folder,
+                 "--format", "json"], cwd=ROOT, capture_output=True, text=True, check=True).stdout)
+            hit, counted, breached = told["totals"]["collisions"], told["totals"]["counted"], sorted(breaches(told))
+            hits, found = hits + hit, found + counted + len(breached)
+            print(f"{fault.stem}, {Path(space).stem}: {hit} collisions, {counted} counted; breached: {', '.join(breached) or 'nothing'}", flush=True)
+        if hits and not found:
+            missed.append(fault.stem)
+    print(f"hit somebody, and without a finding: {', '.join(missed) or 'none'}")
+
+
 def main():
     program = str(Path(sys.argv[1]).resolve())
-    names = sys.argv[2:] or list(DEFECTS)
+    names = [name for name in sys.argv[2:] if name != "--faults"] or list(DEFECTS)
     unknown = [name for name in names if name not in DEFECTS]
     if unknown:
         sys.exit(f"no defect {', '.join(unknown)}; there are {', '.join(DEFECTS)}")
     out = Path(os.environ.get("OUT", ROOT / "target/interop/defects")).resolve()
     out.mkdir(parents=True, exist_ok=True)
+    if "--faults" in sys.argv:
+        return play_faults(program, out)
     controls, missed = {}, []
     for defect in names:
         print(f"{defect}: {DEFECTS[defect][0]}")

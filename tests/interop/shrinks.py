@@ -273,8 +273,10 @@ def words_hold(words, one):
         first = {"none": "no priority", "ego": "ego first"}.get(after["priority"], "the other first")
         wanted.append(f"kept: {after['kind']}, {after['harm']} harm, {first}")
         wanted.append(f"impact {3.6 * before['impact_mps']:.1f} → {3.6 * after['impact_mps']:.1f} km/h")
-    elif before["margin"] is not None:
-        wanted.append(f"margin {before['margin']:.1f} → {after['margin']:.1f}")
+    else:
+        wanted.append(f"kept: `{one['requirement']}` is breached")
+        if before["margin"] is not None:
+            wanted.append(f"margin {before['margin']:.2f} → {after['margin']:.2f}")
     if before["recurrence"] and after["recurrence"]:
         both = [(of, *interval(of)) for of in (before["recurrence"], after["recurrence"])]
         shown = [f"{of['recurred']} of {of['replays']} ({low:.2f} to {high:.2f})" for of, low, high in both]
@@ -311,6 +313,8 @@ def compare(path, way):
             # The page rounds margins to 0.001.
             if printed[part] != held.get(part) and not is_near:
                 bad.append(f"{part} {which}: {printed[part]} is printed, {held.get(part)} is so")
+    if one["requirement"] != after.get("requirement"):
+        bad.append(f"{one['requirement']} is printed, {after.get('requirement')} is so")
     # What is said to be kept is kept.
     for part in KEPT:
         if before.get(part) != after.get(part):

@@ -506,6 +506,30 @@ fn near_misses_are_kept_as_scenarios_that_end_as_they_did() {
 }
 
 #[test]
+fn what_does_not_count_is_kept_first() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("run").display().to_string();
+    let run =
+        ["run", "scenarios/r157.ava", "--episodes", "20", "--seed", "7", "--replays", "0", "--out", &out];
+    let found = last_line(&done(&[&run[..], &["--keep", "30", "--format", "json"]].concat()));
+    let totals = &found["totals"];
+    let uncounted = totals["episodes_with_collision"].as_u64().zip(totals["episodes_with_counted"].as_u64());
+    let uncounted = uncounted.map(|(all, counted)| (all - counted) as usize).expect("numbers");
+    assert!((1..30).contains(&uncounted), "{totals}");
+    let kept: Vec<String> = found["kept"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|file| fs::read_to_string(file.as_str().expect("a path")).expect("it was written"))
+        .collect();
+    let is_uncounted = |text: &String| {
+        text.contains("/// A collision with ") && text.contains(" does not count. Not met: `")
+    };
+    assert!(kept[..uncounted].iter().all(is_uncounted), "{}", kept[0]);
+    assert!(!kept[uncounted..].iter().any(is_uncounted), "then the nearest misses");
+}
+
+#[test]
 fn a_breach_is_explained_and_estimated() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let out = scratch.path().join("found").display().to_string();

@@ -65,15 +65,34 @@ impl FoundIn {
 pub struct Near {
     pub road: String,
     pub episode: i64,
+    /// The first collision, which does not count, if there was one.
+    pub collision: Option<Uncounted>,
     /// The requirement that came nearest to a breach there, with its margin and its unit; `None` if nothing was near.
     pub requirement: Option<(String, f64, String)>,
     /// The shortest time to a collision with somebody ahead, at the speeds of the moment, s.
     pub ttc_s: Option<f64>,
 }
 
+/// A collision that does not count.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Uncounted {
+    pub body: String,
+    /// The number of the road user.
+    pub obstacle: i64,
+    pub time_s: f64,
+    /// The clauses of the verdict that it does not meet.
+    pub unmet: String,
+}
+
 impl Near {
     /// For the reader of its scenario.
     pub fn in_words(&self) -> String {
+        if let Some(Uncounted { body, obstacle, time_s, unmet }) = &self.collision {
+            let unmet = unmet.replace("; ", "`, `");
+            return format!(
+                "A collision with {body}#{obstacle} at {time_s:.2} s does not count. Not met: `{unmet}`."
+            );
+        }
         match (&self.requirement, self.ttc_s) {
             (Some((name, margin, unit)), _) => {
                 format!("Nothing is found here: `{name}` is kept by {margin:.2} {unit}.").replace(" .", ".")
@@ -87,8 +106,9 @@ impl Near {
 }
 
 impl Database {
-    /// Up to `most` episodes in which nothing was found, the nearest misses first: of each requirement the one that came
-    /// nearest to a breach, then of each the second, and so on; then those with the shortest time to a collision.
+    /// Up to `most` episodes in which nothing was found: first those with a collision that does not count; then of each
+    /// requirement the one that came nearest to a breach, of each the second, and so on; then those with the shortest time to a
+    /// collision.
     ///
     /// # Errors
     /// If the database cannot be read.
@@ -99,17 +119,26 @@ impl Database {
                FROM episode
                WHERE counted = 0 AND episode NOT IN (SELECT episode FROM breach)
                  AND episode NOT IN (SELECT episode FROM failure)),
+             hit AS (SELECT episode, body, obstacle, min(time_s) AS time_s, unmet FROM collision GROUP BY episode),
              near AS (
                SELECT episode, requirement, smallest, coalesce(unit, '') AS unit,
                       row_number() OVER (PARTITION BY requirement ORDER BY smallest, episode) AS rank
                FROM margin WHERE smallest IS NOT NULL AND episode IN (SELECT episode FROM calm))
-             SELECT road, episode, requirement, smallest, unit, ttc_s FROM calm LEFT JOIN near USING (episode)
-             ORDER BY rank IS NULL, rank, requirement, ttc_s IS NULL, ttc_s, episode";
+             SELECT road, episode, requirement, smallest, unit, ttc_s, body, obstacle, time_s, unmet
+             FROM calm LEFT JOIN near USING (episode) LEFT JOIN hit USING (episode)
+             ORDER BY body IS NULL, rank IS NULL, rank, requirement, ttc_s IS NULL, ttc_s, episode";
         let rows = query_all(&self.connection, query, |row| {
             let (name, margin): (Option<String>, Option<f64>) = (row.get(2)?, row.get(3)?);
             let unit: Option<String> = row.get(4)?;
             let requirement = name.zip(margin).zip(unit).map(|((name, margin), unit)| (name, margin, unit));
-            Ok(Near { road: row.get(0)?, episode: row.get(1)?, requirement, ttc_s: row.get(5)? })
+            let collision = match row.get(6)? {
+                Some(body) => {
+                    let (obstacle, time_s, unmet) = (row.get(7)?, row.get(8)?, row.get(9)?);
+                    Some(Uncounted { body, obstacle, time_s, unmet })
+                }
+                None => None,
+            };
+            Ok(Near { road: row.get(0)?, episode: row.get(1)?, collision, requirement, ttc_s: row.get(5)? })
         })?;
         let mut found: Vec<Near> = Vec::new();
         for near in rows {

@@ -253,18 +253,18 @@ impl Layout {
     /// Hides units from all later queries over this connection. The file stays as it is: SQLite takes a plain table name for the
     /// temporary view.
     pub(super) fn hide(&self, connection: &Connection, numbers: &[i64]) -> Result<(), rusqlite::Error> {
-        connection.execute_batch("CREATE TEMP TABLE hidden (unit INTEGER PRIMARY KEY) STRICT")?;
-        let mut insert = connection.prepare("INSERT INTO temp.hidden VALUES (?)")?;
-        for number in numbers {
-            insert.execute([number])?;
-        }
-        let tables = self.tables.iter().map(|table| (*table, self.unit)).chain([("seal", "unit")]);
-        for (table, unit) in tables {
+        name_units(connection, numbers)?;
+        for (table, unit) in self.tables_of_units() {
             connection.execute_batch(&format!(
-                "CREATE TEMP VIEW {table} AS SELECT * FROM main.{table} WHERE {unit} NOT IN (SELECT unit FROM temp.hidden)"
+                "CREATE TEMP VIEW {table} AS SELECT * FROM main.{table} WHERE {unit} NOT IN (SELECT unit FROM temp.named)"
             ))?;
         }
         Ok(())
+    }
+
+    /// Each table that has rows of units, with its column of their numbers.
+    fn tables_of_units(&self) -> impl DoubleEndedIterator<Item = (&'static str, &'static str)> {
+        self.tables.iter().map(|table| (*table, self.unit)).chain([("seal", "unit")])
     }
 
     /// Seals the rows of a unit; called in the transaction that adds them.
@@ -279,15 +279,14 @@ impl Layout {
         self.seal(connection, number)
     }
 
-    /// Deletes the rows of a unit.
-    pub(super) fn delete(&self, connection: &Connection, number: i64) -> Result<(), rusqlite::Error> {
-        for table in self.tables.iter().rev() {
-            connection
-                .prepare_cached(&format!("DELETE FROM {table} WHERE {} = ?", self.unit))?
-                .execute([number])?;
+    /// Deletes the rows of units: all at once, because a million seals are cheap to forge.
+    pub(super) fn delete(&self, connection: &Connection, numbers: &[i64]) -> Result<(), rusqlite::Error> {
+        name_units(connection, numbers)?;
+        for (table, unit) in self.tables_of_units().rev() {
+            let named = format!("DELETE FROM {table} WHERE {unit} IN (SELECT unit FROM temp.named)");
+            connection.execute(&named, [])?;
         }
-        connection.prepare_cached("DELETE FROM seal WHERE unit = ?")?.execute([number])?;
-        Ok(())
+        connection.execute_batch("DROP TABLE temp.named")
     }
 
     /// Deletes the rows that no unit names. An edited one would stand in the way of what it was before: both have one key.
@@ -301,10 +300,9 @@ impl Layout {
 
     /// Deletes the rows of all units from a number on.
     pub fn delete_from(&self, connection: &Connection, first: i64) -> Result<(), rusqlite::Error> {
-        for table in self.tables.iter().rev() {
-            connection.execute(&format!("DELETE FROM {table} WHERE {} >= ?", self.unit), [first])?;
+        for (table, unit) in self.tables_of_units().rev() {
+            connection.execute(&format!("DELETE FROM {table} WHERE {unit} >= ?"), [first])?;
         }
-        connection.execute("DELETE FROM seal WHERE unit >= ?", [first])?;
         Ok(())
     }
 
@@ -326,6 +324,16 @@ impl Layout {
         }
         Ok(digest_text(&whole.finalize().into()))
     }
+}
+
+/// Puts numbers of units into the table `temp.named`.
+fn name_units(connection: &Connection, numbers: &[i64]) -> Result<(), rusqlite::Error> {
+    connection.execute_batch("CREATE TEMP TABLE named (unit INTEGER PRIMARY KEY) STRICT")?;
+    let mut insert = connection.prepare("INSERT INTO temp.named VALUES (?)")?;
+    for number in numbers {
+        insert.execute([number])?;
+    }
+    Ok(())
 }
 
 /// The digest of the settings that a database was begun with.

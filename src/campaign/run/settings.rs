@@ -57,7 +57,7 @@ pub struct RunSettings {
     /// Replays of each finding under other chance, to say how often it recurs; 0 for none.
     #[serde(default)]
     pub replays: u32,
-    /// Episodes in which nothing was found that are kept as scenarios, too, the nearest misses first.
+    /// Episodes in which nothing was found that are kept as scenarios, too: collisions that do not count, then the nearest misses.
     #[serde(default)]
     pub keep: u32,
     /// Rules switched off.

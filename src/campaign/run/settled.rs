@@ -69,9 +69,7 @@ pub trait Units: Sized {
     fn open_and_drop(path: &Path, settings: &str) -> Result<(Self, Vec<i64>), DatabaseError> {
         let (mut connection, damaged) = Self::LAYOUT.open_damaged(path, settings, IfEmpty::Begin)?;
         let transaction = connection.transaction()?;
-        for &number in &damaged {
-            Self::LAYOUT.delete(&transaction, number)?;
-        }
+        Self::LAYOUT.delete(&transaction, &damaged)?;
         Self::LAYOUT.delete_unnamed(&transaction)?;
         transaction.commit()?;
         Ok((Self::from_connection(connection), damaged))

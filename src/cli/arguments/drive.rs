@@ -82,7 +82,8 @@ pub struct RunArguments {
     /// recurs; 0 for none.
     #[arg(long, value_name = "N", default_value_t = REPLAYS, value_parser = clap::value_parser!(u32).range(0..=i64::from(avastra_lang::model::REPLAYS_MAX)))]
     pub replays: u32,
-    /// Keep N episodes in which nothing was found as scenarios in `kept`, too, the nearest misses first.
+    /// Keep N episodes in which nothing was found as scenarios in `kept`, too: first those with a collision that does not count,
+    /// then the nearest misses.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1000))]
     pub keep: u32,
     /// Worker threads; the result does not depend on it [default: one for each core].
