@@ -71,7 +71,7 @@ def listed(patterns):
 
 def copy_checkout(changed):
     """Brings the copy to the state of the checkout, touching what differs alone; `changed` are files that are written with changes."""
-    names = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, check=True, text=True).stdout.splitlines()
+    names = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard"], cwd=ROOT, capture_output=True, check=True, text=True).stdout.splitlines()
     for name in set(names) - changed:
         source, copy = ROOT / name, COPY / name
         if source.is_file() and not (copy.is_file() and copy.read_bytes() == source.read_bytes()):

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use rusqlite::{Connection, OpenFlags};
 
-use crate::cases::root;
+use crate::cases::{expect_snapshot, root};
 
 /// Where avastra says otherwise than every analyst, and why it does.
 const ARGUED: [(&str, &str); 3] = [
@@ -31,11 +31,13 @@ fn situations_are_judged_as_their_analysts_signed() {
     let mut wrong = Vec::new();
     let mut played = 0;
     for part in ["first", "second"] {
+        let mut all = String::new();
         let tables: Vec<BTreeMap<String, Label>> = labels(&folder.join(part));
         for path in blind(&folder.join(part)) {
             played += 1;
             let case = path.file_stem().expect("it has a name").to_string_lossy().into_owned();
             let said = play(&path);
+            all += &format!("{case}\n{}", said.in_full);
             let of = tables.iter().map(|table| disagreements(&table[&case], &said, &newer));
             let found: Vec<Vec<String>> = of.collect();
             let agrees = found.iter().any(Vec::is_empty);
@@ -44,6 +46,8 @@ fn situations_are_judged_as_their_analysts_signed() {
                 wrong.push(format!("{part}/{case}: {found:?}"));
             }
         }
+        // A label says what; the snapshot also says when, by which rule and by how much.
+        expect_snapshot("situations", part, &all);
     }
     assert!(played >= 110, "{played} situations");
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
@@ -84,6 +88,8 @@ fn labels(folder: &Path) -> Vec<BTreeMap<String, Label>> {
 struct Said {
     contacts: Vec<Label>,
     breaches: BTreeSet<String>,
+    /// All that was found, a line each.
+    in_full: String,
 }
 
 fn play(path: &Path) -> Said {
@@ -122,7 +128,19 @@ fn play(path: &Path) -> Said {
     let contacts = contacts.expect("it can be read").map(|row| row.expect("it can be read")).collect();
     let mut statement = database.prepare("SELECT requirement FROM breach").expect("the table is there");
     let breaches = statement.query_map([], |row| row.get(0)).expect("it can be read");
-    Said { contacts, breaches: breaches.map(|name| name.expect("it can be read")).collect() }
+    let breaches = breaches.map(|name| name.expect("it can be read")).collect();
+    let lines = "SELECT printf('  %s#%d at %.2f s: %s by %s at %.2f s (%s); %s from %.2f s by %s, %s; %s; %s, harm %.3f', \
+                   body, obstacle, time_s, priority, priority_rule, priority_time_s, priority_motion, avoidability, \
+                   hazard_onset_s, avoided_by, coalesce(evasion, 'no evasion'), precrash, shape, harm_share) \
+                 FROM collision \
+                 UNION ALL SELECT printf('  %s at %.2f to %.2f s, margin %s', requirement, time_s, until_s, \
+                   coalesce(printf('%.3f', margin), 'unknown')) FROM breach \
+                 UNION ALL SELECT printf('  %s asked for %.2f s, at least %s', requirement, asked_s, \
+                   coalesce(printf('%.3f', smallest), 'unknown')) FROM margin WHERE asked_s > 0";
+    let mut statement = database.prepare(lines).expect("the columns are there");
+    let lines = statement.query_map([], |row| row.get::<_, String>(0)).expect("it can be read");
+    let in_full = lines.map(|line| line.expect("it can be read") + "\n").collect();
+    Said { contacts, breaches, in_full }
 }
 
 /// The fields of a label that are said otherwise.

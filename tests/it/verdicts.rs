@@ -2,13 +2,18 @@
 //! and the avoidability that an engineer would sign, and a sentence that says why. A verdict that changes shows here, and
 //! the change is reviewed like that of a snapshot.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::Mutex;
 
 use avastra::action::ActionTable;
+use avastra::model::vocabulary::Word;
 use avastra::model::{Avoidability, Claim, Scenario};
+use avastra::oracle::Judgement;
 use avastra::run::{Stage, recorded};
+use avastra::sim::Contact;
 
-use crate::cases::{cases, root, try_each};
+use crate::cases::{cases, expect_snapshot, root, try_each};
 use crate::world::{read, run_of};
 
 /// The family of situations that are judged otherwise than their labels say.
@@ -18,14 +23,23 @@ const DISPUTED: &str = "disputed/";
 #[test]
 fn situations_are_judged_as_labelled() {
     assert!(cases("verdicts").len() >= 200);
+    let families: Mutex<BTreeMap<String, BTreeSet<String>>> = Mutex::default();
     try_each("verdicts", |name, path| {
-        let Shown { missing, refuted } = show(path);
+        let Shown { missing, refuted, in_full } = show(path);
+        let (family, case) = name.split_once('/').expect("each stands in a family");
+        let mut families = families.lock().expect("nothing fails while it is held");
+        families.entry(family.to_owned()).or_default().insert(format!("{case}\n{in_full}"));
+        drop(families);
         assert!(missing.is_empty(), "its label lacks {missing:?}");
         match name.starts_with(DISPUTED) {
             false => assert!(refuted.is_empty(), "{refuted:?}"),
             true => assert!(!refuted.is_empty(), "it is settled: move it to its family"),
         }
     });
+    // A label says what; the snapshot also says when, by which rule and by whom it would have been avoided.
+    for (family, cases) in families.into_inner().expect("nothing failed while it was held") {
+        expect_snapshot("verdicts", &family, &cases.into_iter().collect::<String>());
+    }
 }
 
 /// What the replay of a situation shows.
@@ -34,6 +48,8 @@ struct Shown {
     missing: Vec<&'static str>,
     /// The claims that do not hold, each with what was found.
     refuted: Vec<String>,
+    /// The verdict on each collision, a line each.
+    in_full: String,
 }
 
 /// A driver that takes over after a lane change of the route stays in the lane that it is in: it neither swerves into one
@@ -63,11 +79,27 @@ fn show(path: &Path) -> Shown {
     let table = ActionTable::new(space);
     let stage = Stage::new(&table, &scenario).expect("it is of this engine");
     let ads = recorded(&scenario).expect("its driving system exists");
-    let log = stage.play(&ads, &mut |_, _, _| {});
+    let (log, judgements, _) = stage.first_found(&ads);
     let results = stage.verify(&ads, &log);
     let refuted = results.iter().filter(|result| result.confirmed != Some(true));
     let refuted = refuted.map(|result| format!("{}, found {}", result.claim, result.found)).collect();
-    Shown { missing: missing(&scenario), refuted }
+    let in_full = log.collisions.iter().zip(&judgements).map(|(collision, judgement)| {
+        let Contact { obstacle, time_s, ruling, .. } = collision.contact;
+        let Judgement { class, onset_s, avoided_by, r157_letter, evasion } = judgement;
+        format!(
+            "  #{obstacle} at {time_s:.2} s: {} by {} at {:.2} s ({}); {} from {onset_s:.2} s by {}, to the letter by {}, {}; {}\n",
+            ruling.priority.name(),
+            ruling.rule.name(),
+            ruling.time_s,
+            ruling.mover.name(),
+            class.name(),
+            avoided_by.join(" "),
+            r157_letter.join(" "),
+            evasion.as_deref().unwrap_or("no evasion"),
+            collision.kind.name(),
+        )
+    });
+    Shown { missing: missing(&scenario), refuted, in_full: in_full.collect() }
 }
 
 /// What the label of a situation lacks: a sentence, or one of the claims.
