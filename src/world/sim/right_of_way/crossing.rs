@@ -251,3 +251,67 @@ pub(super) fn intrudes(vehicle: &Vehicle, passed: [&Passed; 2], around: &Around)
             && by_rules([*lane, area.other], passed, around).0 == Priority::Ego
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::World;
+    use crate::sim::testing::{self, Heading};
+
+    fn passage(in_m: f64, out_m: f64, speed_mps: f64) -> Passage {
+        Passage { lane: LaneIndex(0), in_m, out_m, speed_mps }
+    }
+
+    #[test]
+    fn there_is_time_if_the_first_has_cleared_the_area_or_gentle_braking_suffices() {
+        let inside = passage(-1.0, 6.0, 3.0);
+        // At 10 m/s: 4 m of reaction and 16.7 m of braking.
+        assert!(passage(20.7, 30.0, 10.0).has_time_for(&inside));
+        assert!(!passage(20.6, 30.0, 10.0).has_time_for(&inside));
+        // One that has 1 m to go at 4 m/s is out 0.25 s later, and then there is a margin.
+        let soon = passage(-5.0, 1.0, 4.0);
+        let clear_s = 0.25 + CLEAR_S;
+        assert!(passage(10.0 * clear_s + 0.1, 30.0, 10.0).has_time_for(&soon));
+        assert!(!passage(10.0 * clear_s - 0.1, 30.0, 10.0).has_time_for(&soon));
+        // One that stands counts as 0.5 m/s, and so does the one that comes.
+        assert!(!passage(20.0, 30.0, 10.0).has_time_for(&passage(-1.0, 1.0, 0.0)));
+        assert!(passage(0.5 * clear_s, 30.0, 0.0).has_time_for(&soon), "it can stop at once");
+        assert!(!passage(0.0, 6.0, 0.0).has_time_for(&soon), "it is in the area itself");
+    }
+
+    #[test]
+    fn inside_is_from_the_front_in_to_the_rear_out() {
+        assert!(passage(0.0, 0.1, 5.0).is_inside() && passage(-9.0, 1.0, 5.0).is_inside());
+        assert!(!passage(0.1, 9.0, 5.0).is_inside() && !passage(-9.0, 0.0, 5.0).is_inside());
+    }
+
+    #[test]
+    fn the_first_has_given_way_if_it_left_the_second_time_but_not_after_a_violation() {
+        let scene = testing::oncoming(Heading::Straight);
+        let map = &scene.map;
+        let on = |road: &str| {
+            LaneIndex(map.lanes.iter().position(|lane| lane.key.road == road).expect("it is there"))
+        };
+        let around_of = World::new(scene.clone(), &testing::start());
+        let around = around_of.alone();
+        let (straight, left) = (scene.route_areas[0].lane, on("8"));
+        let passed = Passed::default();
+        let told = |ego: Passage, other: Passage, has_siren: bool| {
+            let of = Crossing { ego, other }.ruling([&passed, &passed], has_siren, &around);
+            assert_eq!(of.time_s, 0.0);
+            (of.priority, of.rule, of.mover)
+        };
+        let ego = |in_m: f64| Passage { lane: straight, ..passage(in_m, in_m + 10.0, 10.0) };
+        let other = |in_m: f64| Passage { lane: left, ..passage(in_m, in_m + 10.0, 3.0) };
+        // The other turns left before the ego vehicle, which goes straight on.
+        assert_eq!(told(ego(15.0), other(-1.0), false), (Priority::Ego, Rule::Turning, Mover::Other));
+        assert_eq!(told(ego(40.0), other(-1.0), false), (Priority::Other, Rule::Clearing, Mover::Other));
+        assert_eq!(told(ego(-1.0), other(15.0), false), (Priority::Ego, Rule::Turning, Mover::Ego));
+        assert_eq!(told(ego(-1.0), other(-1.0), false), (Priority::Ego, Rule::Turning, Mover::Both));
+        // A siren goes before the ego vehicle, which clears the area for it if there is time.
+        assert_eq!(told(ego(15.0), other(-1.0), true), (Priority::Other, Rule::Siren, Mover::Other));
+        assert_eq!(told(ego(-1.0), other(30.0), true), (Priority::Ego, Rule::Clearing, Mover::Ego));
+        assert_eq!(told(ego(-1.0), other(0.5), true), (Priority::Other, Rule::Siren, Mover::Ego));
+        assert_eq!(told(ego(-1.0), other(-1.0), true), (Priority::Other, Rule::Siren, Mover::Both));
+    }
+}

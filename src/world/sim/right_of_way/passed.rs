@@ -214,3 +214,82 @@ fn shown(signal: usize, speed_mps: f64, around: &Around) -> Shown {
         SignalColour::Green => Shown::Free,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::testing;
+    use crate::sim::{Start, World};
+
+    #[test]
+    fn at_stop_signs_the_first_to_stand_goes_first_and_who_did_not_stand_gives_way() {
+        let (stop, none) = ("206", "274");
+        let decided = |signs: [&str; 2], stood: [Option<Option<u64>>; 2]| {
+            let map = testing::crossing_of(signs[0], signs[1]).map.clone();
+            let lanes = ["2", "5"].map(|road| map.place(road, -1, 10.0).expect("it is there").lane);
+            let passed = [0, 1].map(|nth| {
+                let lane = map.approach(lanes[nth]).last().expect("a lane leads to it");
+                Passed { sign: stood[nth].map(|stood| PassedSign { lane, stood }), ..Passed::default() }
+            });
+            by_stops(lanes, [&passed[0], &passed[1]], &map).map(|(priority, rule)| (priority, rule.name()))
+        };
+        let at = |tick: u64| Some(Some(tick));
+        let (first, ran) = (Rule::FirstToStop.name(), Rule::StopSign.name());
+        let both = |stood| decided([stop, stop], stood);
+        // A second is 50 ticks: who is earlier by more goes first.
+        assert_eq!(both([at(100), at(151)]), Some((Priority::Ego, first)));
+        assert_eq!(both([at(151), at(100)]), Some((Priority::Other, first)));
+        assert_eq!((both([at(100), at(150)]), both([at(150), at(100)])), (None, None));
+        assert_eq!(both([at(100), None]), Some((Priority::Ego, first)), "the other has not come to its sign");
+        assert_eq!(both([None, at(100)]), Some((Priority::Other, first)));
+        assert_eq!(both([None, None]), None);
+        assert_eq!(both([Some(None), at(100)]), Some((Priority::Other, ran)));
+        assert_eq!(both([at(100), Some(None)]), Some((Priority::Ego, ran)));
+        assert_eq!(both([Some(None), Some(None)]), Some((Priority::None, ran)));
+        assert_eq!(decided([stop, none], [Some(None), None]), Some((Priority::Other, ran)));
+        assert_eq!(decided([none, stop], [None, Some(None)]), Some((Priority::Ego, ran)));
+        assert_eq!(decided([stop, none], [at(100), None]), None, "its sign alone decides, elsewhere");
+        assert_eq!(decided([none, none], [None, None]), None);
+    }
+
+    /// At 7 m/s a vehicle can stop for 1 s of reaction and 1 s of braking: what is yellow for longer is late.
+    #[test]
+    fn yellow_is_late_once_the_vehicle_could_have_stopped() {
+        let scene = testing::crossing();
+        let world =
+            |phase_s: f64| World::new(scene.clone(), &Start { signal_phase_s: phase_s, ..testing::start() });
+        let colour = |phase_s: f64| {
+            let world = world(phase_s);
+            world.alone().signals.colour(&scene.map, 0, 0)
+        };
+        let mut phases = (0..3_400).map(|step| f64::from(step) * 0.02);
+        let yellow_s = phases
+            .find(|phase_s| {
+                colour(*phase_s) == SignalColour::Yellow && colour(phase_s - 0.02) != SignalColour::Yellow
+            })
+            .expect("it is yellow once a cycle");
+        let at = |since_s: f64, speed_mps: f64| {
+            let world = world(yellow_s + since_s);
+            shown(0, speed_mps, &world.alone())
+        };
+        assert_eq!((at(1.94, 7.0), at(2.06, 7.0)), (Shown::Free, Shown::LateYellow));
+        assert_eq!((at(0.94, 0.0), at(1.06, 0.0)), (Shown::Free, Shown::LateYellow));
+        assert_eq!((at(-0.1, 7.0), at(3.5, 7.0)), (Shown::Free, Shown::Red), "green before, red afterwards");
+    }
+
+    #[test]
+    fn to_have_stood_is_to_have_stood_within_five_seconds() {
+        let scene = testing::crossing();
+        let mut world = World::new(scene, &testing::start());
+        let mut passed = Passed::default();
+        passed.note_standing(0.4, &world.alone());
+        assert_eq!(passed.just_stood(&world.alone()), None, "0.4 m/s is no stand");
+        passed.note_standing(0.3, &world.alone());
+        for _ in 0..250 {
+            world.tick(&crate::sim::tests::hold(&world, 5.0));
+        }
+        assert_eq!(passed.just_stood(&world.alone()), Some(0));
+        world.tick(&crate::sim::tests::hold(&world, 5.0));
+        assert_eq!(passed.just_stood(&world.alone()), None);
+    }
+}

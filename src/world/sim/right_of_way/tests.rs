@@ -88,6 +88,17 @@ fn a_vehicle_that_turns_across_gives_way_and_so_does_the_ego_vehicle() {
 }
 
 #[test]
+fn a_siren_goes_first_whatever_the_lanes_say() {
+    let mut world = begin(&testing::oncoming(Heading::Straight), 0.0);
+    drive_to(&mut world, 80.0, 10.0);
+    world.put("3", 1, "8", 193.0, 7.0);
+    world.sound_siren();
+    let Ruling { priority, rule, mover, time_s } = contact(&mut world, 10.0).ruling;
+    assert_eq!((priority, rule, mover), (Priority::Other, Rule::Siren, Mover::Other));
+    assert!((world.time_s() - 1.5..world.time_s()).contains(&time_s), "{time_s}");
+}
+
+#[test]
 fn a_vehicle_that_stands_in_the_junction_has_given_way_long_ago() {
     let mut world = begin(&testing::oncoming(Heading::Straight), 0.0);
     drive_to(&mut world, 20.0, 8.0);
@@ -149,6 +160,122 @@ fn one_who_cuts_in_and_stops_has_not_given_way_before_the_distance_is_back() {
     // What was found stays while it brakes to rest, and until there is room to brake gently for it.
     assert!(!side(4.0, 10.0).is_gentle() && !side(6.0, 5.0).is_gentle() && !side(4.0, 0.0).is_gentle());
     assert!(side(22.0, 0.0).is_gentle());
+}
+
+/// Two in one direction, the ego vehicle 2 m behind, flank to flank by half a metre and at the same speed; neither leaves its lane.
+const SIDE: Side = Side {
+    aside_m: -0.5,
+    apart_m: 2.0,
+    ego_is_ahead: false,
+    along: 1.0,
+    ego_mps: 10.0,
+    other_mps: 10.0,
+    ego_does: None,
+    other_does: None,
+};
+
+#[test]
+fn in_one_lane_the_one_behind_keeps_its_distance_unless_the_one_ahead_backs() {
+    let told = |side: Side| {
+        let ruling = side.at_contact(|| None, 3.0).expect("their ends have met");
+        assert_eq!(ruling.time_s, 3.0);
+        (ruling.priority, ruling.rule, ruling.mover)
+    };
+    let (backs, leaves) = (Some(Rule::Backing), Some(Rule::LeavingLane));
+    let behind = (Priority::Other, Rule::Distance, Mover::Ego);
+    let ahead = (Priority::Ego, Rule::Distance, Mover::Other);
+    assert_eq!(told(SIDE), behind);
+    assert_eq!(told(Side { ego_does: backs, ..SIDE }), behind, "it is the one behind");
+    assert_eq!(told(Side { other_does: backs, ..SIDE }), (Priority::Ego, Rule::Backing, Mover::Other));
+    assert_eq!(told(Side { other_does: leaves, ..SIDE }), behind, "it had left its lane long ago");
+    let before = Side { ego_is_ahead: true, ..SIDE };
+    assert_eq!(told(before), ahead);
+    assert_eq!(told(Side { other_does: backs, ..before }), ahead);
+    assert_eq!(told(Side { ego_does: backs, ..before }), (Priority::Other, Rule::Backing, Mover::Ego));
+    // Where the ends and the flanks are as near, the ends have met.
+    assert_eq!(told(Side { apart_m: -0.5, ..SIDE }), behind);
+}
+
+#[test]
+fn flank_at_flank_the_one_that_leaves_its_lane_gives_way_and_then_the_faster() {
+    let told = |side: Side| side.at_contact(|| None, 3.0).map(|of| (of.priority, of.rule, of.mover));
+    let beside = Side { apart_m: -3.0, aside_m: 0.0, ..SIDE };
+    let leaves = Some(Rule::LeavingLane);
+    let both = Some((Priority::None, Rule::BothLeaveLanes, Mover::Both));
+    assert_eq!(told(Side { ego_does: leaves, other_does: leaves, ..beside }), both);
+    let ego = Some((Priority::Other, Rule::Entering, Mover::Ego));
+    assert_eq!(told(Side { ego_does: Some(Rule::Entering), ..beside }), ego);
+    assert_eq!(
+        told(Side { other_does: leaves, ..beside }),
+        Some((Priority::Ego, Rule::LeavingLane, Mover::Other))
+    );
+    // The faster by more than a standing one's 0.1 m/s overtakes.
+    let ego_passes = Some((Priority::Other, Rule::Overtaking, Mover::Ego));
+    let other_passes = Some((Priority::Ego, Rule::Overtaking, Mover::Other));
+    assert_eq!(told(Side { ego_mps: 12.0, ..beside }), ego_passes);
+    assert_eq!(told(Side { ego_mps: 5.0, ..beside }), other_passes);
+    assert_eq!(told(Side { ego_mps: 10.05, ..beside }), None);
+    assert_eq!(told(Side { ego_mps: 12.0, along: 0.5, ..beside }), None, "they lie across each other");
+    // Across each other no end decides.
+    assert_eq!(
+        told(Side { along: 0.5, ego_does: leaves, ..SIDE }),
+        Some((Priority::Other, Rule::LeavingLane, Mover::Ego))
+    );
+}
+
+#[test]
+fn of_two_that_meet_the_middle_of_the_road_decides_and_then_the_lane() {
+    let oncoming = Side { along: -0.9, ..SIDE };
+    let middle = || Some(Ruling { rule: Rule::Middle, ..Ruling::default() });
+    assert_eq!(oncoming.at_contact(middle, 3.0).map(|of| of.rule), Some(Rule::Middle));
+    assert_eq!(oncoming.at_coming(middle, 3.0).map(|of| of.rule), Some(Rule::Middle));
+    assert_eq!(Side { along: -0.5, ..SIDE }.at_coming(middle, 3.0), None, "that is across");
+    let told = |side: Side| side.at_contact(|| None, 3.0).map(|of| (of.priority, of.rule, of.mover));
+    let leaves = Some(Rule::LeavingLane);
+    assert_eq!(
+        told(Side { other_does: leaves, ..oncoming }),
+        Some((Priority::Ego, Rule::LeavingLane, Mover::Other))
+    );
+    assert_eq!(
+        told(Side { ego_does: leaves, ..oncoming }),
+        Some((Priority::Other, Rule::LeavingLane, Mover::Ego))
+    );
+    assert_eq!(told(oncoming), Some((Priority::Other, Rule::default(), Mover::Ego)));
+}
+
+#[test]
+fn who_comes_into_a_lane_gives_way_unless_it_comes_behind_or_leaves_room() {
+    let told = |side: Side| side.at_coming(|| None, 3.0).map(|of| (of.priority, of.mover));
+    let leaves = Some(Rule::LeavingLane);
+    let (of_ego, of_other) = (Some((Priority::Other, Mover::Ego)), Some((Priority::Ego, Mover::Other)));
+    // 2 m before or behind, as fast: less than a second.
+    let [ego, other] = [Side { ego_does: leaves, ..SIDE }, Side { other_does: leaves, ..SIDE }];
+    assert_eq!(told(ego), None, "it comes behind the other");
+    assert_eq!(told(other), of_other);
+    assert_eq!(told(Side { ego_is_ahead: true, ..ego }), of_ego);
+    assert_eq!(told(Side { ego_is_ahead: true, ..other }), None, "it comes behind the ego vehicle");
+    // Beside the other, and not behind it.
+    assert_eq!(told(Side { apart_m: -1.0, ..ego }), of_ego);
+    assert_eq!(told(Side { apart_m: -1.0, ego_is_ahead: true, ..other }), of_other);
+    assert_eq!(told(Side { along: 0.0, ..ego }), of_ego, "across the other");
+    assert_eq!(told(SIDE), None, "neither comes");
+}
+
+#[test]
+fn gentle_is_a_second_and_braking_at_3_mps2_after_a_reaction() {
+    let gentle = |side: Side| side.is_gentle();
+    // As fast: a second of the one ahead, 10 m.
+    assert!(!gentle(Side { apart_m: 9.9, ..SIDE }) && gentle(Side { apart_m: 10.1, ..SIDE }));
+    // 6 m/s faster: a second of 4 m/s, 2.4 m of reaction and 6 m of braking are 12.4 m.
+    let closes = Side { other_mps: 4.0, ..SIDE };
+    assert!(!gentle(Side { apart_m: 12.3, ..closes }) && gentle(Side { apart_m: 12.5, ..closes }));
+    // The same, the other behind.
+    let closed = Side { ego_mps: 4.0, ego_is_ahead: true, ..SIDE };
+    assert!(!gentle(Side { apart_m: 12.3, ..closed }) && gentle(Side { apart_m: 12.5, ..closed }));
+    // One that comes backwards counts as standing: 4 m of reaction and 16.7 m of braking.
+    let backs = Side { other_mps: -5.0, ..SIDE };
+    assert!(!gentle(Side { apart_m: 20.6, ..backs }) && gentle(Side { apart_m: 20.7, ..backs }));
+    assert!(!gentle(Side { apart_m: 30.0, along: 0.0, ..SIDE }));
 }
 
 #[test]

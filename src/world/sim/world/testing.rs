@@ -29,4 +29,11 @@ impl World {
         self.users.push(user);
         self.next_id += 1;
     }
+
+    /// The latest to appear is an emergency vehicle under way from now on.
+    pub fn sound_siren(&mut self) {
+        let latest = self.users.last_mut().expect("somebody is there");
+        let Motion::Drive(driver) = &mut latest.mover.motion else { panic!("it is driven") };
+        driver.has_siren = true;
+    }
 }
