@@ -37,11 +37,11 @@ REFUSED = ROOT / "target/mutants/refused.json"
 SUBJECTS = {
     "judging": [
         (["src/world/sim/right_of_way.rs", "src/world/sim/right_of_way/*.rs"],
-         ["avastra-world", "avastra-campaign"], ["situations::", "verdicts::", "pedestrians::"]),
+         ["avastra-world", "avastra-campaign"], ["situations::", "verdicts::"]),
         ([f"src/campaign/{name}.rs" for name in ("episode/precrash", "oracle/avoidable", "oracle/counted")],
          ["avastra-campaign"], ["situations::", "verdicts::", "r157::"]),
         (["src/campaign/episode/monitor.rs"], ["avastra-campaign"], ["situations::", "requirements::"]),
-        (["src/campaign/oracle/shrink.rs"], ["avastra-campaign"], ["failures::", "sureness::"]),
+        (["src/campaign/oracle/shrink.rs"], ["avastra-campaign"], ["shrinks::", "sureness::"]),
     ],
     "rules": [
         (["src/lang/model/rules/*.rs", "src/lang/model/memory.rs", "src/world/action/draw.rs"],

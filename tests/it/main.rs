@@ -42,6 +42,7 @@ mod road;
 mod rules;
 mod scaling_maps;
 mod shards;
+mod shrinks;
 mod situations;
 mod studies;
 mod suites;

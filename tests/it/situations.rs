@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use rusqlite::{Connection, OpenFlags};
 
 use crate::cases::{expect_snapshot, root};
+use crate::command::done;
 
 /// Where avastra says otherwise than every analyst, and why it does.
 const ARGUED: [(&str, &str); 3] = [
@@ -129,18 +130,57 @@ fn play(path: &Path) -> Said {
     let mut statement = database.prepare("SELECT requirement FROM breach").expect("the table is there");
     let breaches = statement.query_map([], |row| row.get(0)).expect("it can be read");
     let breaches = breaches.map(|name| name.expect("it can be read")).collect();
-    let lines = "SELECT printf('  %s#%d at %.2f s: %s by %s at %.2f s (%s); %s from %.2f s by %s, %s; %s; %s, harm %.3f', \
-                   body, obstacle, time_s, priority, priority_rule, priority_time_s, priority_motion, avoidability, \
-                   hazard_onset_s, avoided_by, coalesce(evasion, 'no evasion'), precrash, shape, harm_share) \
-                 FROM collision \
-                 UNION ALL SELECT printf('  %s at %.2f to %.2f s, margin %s', requirement, time_s, until_s, \
-                   coalesce(printf('%.3f', margin), 'unknown')) FROM breach \
-                 UNION ALL SELECT printf('  %s asked for %.2f s, at least %s', requirement, asked_s, \
-                   coalesce(printf('%.3f', smallest), 'unknown')) FROM margin WHERE asked_s > 0";
-    let mut statement = database.prepare(lines).expect("the columns are there");
-    let lines = statement.query_map([], |row| row.get::<_, String>(0)).expect("it can be read");
-    let in_full = lines.map(|line| line.expect("it can be read") + "\n").collect();
+    let in_full = in_full(&database) + &asked(&database);
     Said { contacts, breaches, in_full }
+}
+
+/// All that a run found, a line each: collisions with their whole verdicts, and breaches.
+fn in_full(database: &Connection) -> String {
+    let query = "SELECT printf('  %s_%04d %s#%d at %.2f s: %s by %s at %.2f s (%s); %s from %.2f s by %s, %s; %s; %s, harm %.3f%s%s', \
+                   road, episode, body, obstacle, time_s, priority, priority_rule, priority_time_s, priority_motion, avoidability, \
+                   hazard_onset_s, avoided_by, coalesce(evasion, 'no evasion'), precrash, shape, harm_share, \
+                   iif(struck, ', struck', ''), iif(sudden, ', sudden', '')), episode, number \
+                 FROM collision JOIN episode USING (episode) \
+                 UNION ALL SELECT printf('  %s_%04d %s at %.2f to %.2f s, margin %s%s', road, episode, requirement, time_s, until_s, \
+                   coalesce(printf('%.3f', margin), 'unknown'), coalesce(', kept by ' || kept_by, '')), episode, number \
+                 FROM breach JOIN episode USING (episode) ORDER BY 2, 3, 1";
+    lines(database, query)
+}
+
+/// How long each requirement was asked for, and by how much it was kept.
+fn asked(database: &Connection) -> String {
+    let query = "SELECT printf('  %s asked for %.2f s, at least %s', requirement, asked_s, \
+                   coalesce(printf('%.3f', smallest), 'unknown')) FROM margin WHERE asked_s > 0";
+    lines(database, query)
+}
+
+fn lines(database: &Connection, query: &str) -> String {
+    let mut statement = database.prepare(query).expect("the columns are there");
+    let lines = statement.query_map([], |row| row.get::<_, String>(0)).expect("it can be read");
+    lines.map(|line| line.expect("it can be read") + "\n").collect()
+}
+
+/// What happens in shipped spaces to a driver that heeds nobody, and to one that yields to nobody: each verdict in full. Labels of
+/// single situations say what is right; this says that nothing else moves.
+#[test]
+fn runs_of_careless_drivers_are_judged_as_before() {
+    let never_yields = "scenarios/ads/faults/planning_never_yields.yaml";
+    for (name, space, ads, episodes, ambient) in [
+        ("heeds_nobody_law", "avastra45_law", "blind", "50", "4"),
+        ("heeds_nobody_manoeuvres", "manoeuvres", "blind", "14", "0"),
+        ("heeds_nobody_motorway", "r157", "blind", "5", "0"),
+        ("heeds_nobody_deepcollision", "deepcollision52", "blind", "40", "0"),
+        ("never_yields_law", "avastra45_law", never_yields, "60", "6"),
+        ("never_yields_manoeuvres", "manoeuvres", never_yields, "20", "0"),
+    ] {
+        let out = tempfile::tempdir().expect("there is room");
+        let out = out.path().join("run").display().to_string();
+        let file = format!("scenarios/{space}.ava");
+        let run = ["run", &file, "--ads", ads, "--episodes", episodes, "--ambient", ambient, "--seed", "1"];
+        done(&[&run[..], &["--replays", "0", "--out", &out]].concat());
+        let database = Connection::open_with_flags(format!("{out}/run.db"), OpenFlags::SQLITE_OPEN_READ_ONLY);
+        expect_snapshot("situations", name, &in_full(&database.expect("it was written")));
+    }
 }
 
 /// The fields of a label that are said otherwise.

@@ -1,0 +1,60 @@
+//! What `shrink` makes of crashes and breaches: what is left, what it was worth before and after, and in how many plays. Each
+//! part of the search has something to do: needless actions, steps, traffic, effects, weather, delays, and numbers.
+
+use serde_json::Value;
+
+use crate::cases::{expect_snapshot, files, root};
+use crate::command::{done, last_line};
+
+#[test]
+fn each_part_of_a_scenario_is_made_smaller_or_plainer() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("run").display().to_string();
+    let space = root().join("tests/cases/spaces/shrinkable.ava").display().to_string();
+    let run = ["run", &space, "--ads", "blind", "--episodes", "12", "--seed", "3", "--ambient", "3"];
+    done(&[&run[..], &["--replays", "6", "--out", &out]].concat());
+
+    let found = files(format!("{out}/critical"), "ava");
+    let delayed = found.iter().filter(|path| delay_last_step(path)).count();
+    assert!(found.len() >= 20 && delayed >= 2, "{delayed} of {}", found.len());
+    let found: Vec<String> = found.iter().map(|path| path.display().to_string()).collect();
+    let found: Vec<&str> = found.iter().map(String::as_str).collect();
+    let shrunk = last_line(&done(&[&["shrink", "--format", "json"], &found[..]].concat()));
+    let told = shrunk["scenarios"].as_array().expect("a list").iter().map(in_full);
+    expect_snapshot("shrinks", "all", &told.collect::<String>());
+}
+
+/// Lets the step of a short scenario begin later, if its text has one step.
+fn delay_last_step(path: &std::path::Path) -> bool {
+    let text = std::fs::read_to_string(path).expect("it was written");
+    let lines: Vec<&str> = text.lines().collect();
+    let steps =
+        lines.iter().filter(|line| line.trim_start().starts_with(|c: char| c.is_ascii_digit())).count();
+    let Some(at) = lines.iter().position(|line| line.starts_with("    0: ")).filter(|_| steps == 1) else {
+        return false;
+    };
+    let end = (at..lines.len()).find(|line| lines[*line].ends_with('}')).expect("its values end");
+    let delayed = format!("{} once ego.speed > 1 m/s", lines[end]);
+    let changed = [&lines[..end], &[delayed.as_str()], &lines[end + 1..]].concat().join("\n");
+    std::fs::write(path, changed + "\n").expect("it can be written");
+    true
+}
+
+/// What became of a scenario: sizes, plays, worth, and the file without digests.
+fn in_full(one: &Value) -> String {
+    let text = std::fs::read_to_string(one["output"].as_str().expect("a path")).expect("it was written");
+    let scenario = text.lines().skip_while(|line| !line.starts_with("  road: "));
+    let scenario = scenario.filter(|line| !line.contains("sha256:"));
+    format!(
+        "{}: {} of {} actions, {} of {} steps, {} plays\n  before {}\n  after  {}\n{}\n",
+        one["scenario"],
+        one["actions"],
+        one["actions_before"],
+        one["steps"],
+        one["steps_before"],
+        one["plays"],
+        one["worth_before"],
+        one["worth"],
+        scenario.collect::<Vec<_>>().join("\n")
+    )
+}
