@@ -37,5 +37,7 @@
 //! ```
 
 pub mod action;
+mod scene;
+mod state;
 pub mod sim;
 pub mod places;

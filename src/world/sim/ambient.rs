@@ -18,11 +18,11 @@ use avastra_lang::model::vocabulary::{Body, BodyClass, Colour, Verb, Word};
 
 use super::around::Around;
 use super::body;
-use super::lanes::may_use;
 use super::npc::{Cruise, Driver};
 use super::road_user::{Motion, Mover, Obstacle, RoadUser};
-use super::trace::Trace;
-use super::way::Way;
+use crate::scene::lanes::may_use;
+use crate::scene::way::Way;
+use crate::state::trace::Trace;
 
 /// Ids up to this are of obstacles that an action made appear.
 pub(super) const COMMANDED_MAX: u32 = 1_000_000;
@@ -92,7 +92,7 @@ fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<RoadU
     let bodies =
         || Body::ALL.iter().filter(|body| BodyClass::Vehicle.holds(**body) && !body.has_two_wheels());
     let body = *bodies().nth(rng::below(rng, bodies().count() as u32) as usize)?;
-    if !may_use(around, lane, body, IgnoredRules::default()) {
+    if !may_use(around.scene, lane, body, IgnoredRules::default()) {
         return None;
     }
     let colour = Colour::ALL[rng::below(rng, Colour::ALL.len() as u32) as usize];
@@ -107,7 +107,7 @@ fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<RoadU
     {
         return None;
     }
-    let way = Way::along(around.scene, &[lane], rng)?;
+    let way = Way::along(&around.scene.roads, &[lane], rng)?;
     let driver = Driver::new(around.scene, way, station_m, cruise, Vec::new());
     let moved = driver.moved(&size);
     let mover = Mover::new(size, Motion::Drive(driver));

@@ -10,11 +10,11 @@ use super::npc::Driver;
 use super::pedestrian::Walker;
 use super::right_of_way::Passed;
 use super::road_user::{Motion, Obstacle, RoadUser};
-use super::scene::Scene;
-use super::sense::EgoMotion;
-use super::signals::SignalClock;
-use super::traffic::TrafficProfile;
-use super::world::DT_S;
+use crate::scene::Scene;
+use crate::scene::traffic::TrafficProfile;
+use crate::state::sensed::EgoMotion;
+use crate::state::signals::SignalClock;
+use crate::state::time::DT_S;
 
 /// A way within this distance of the route meets it or passes over it, m: three lanes, so that what drives beside
 /// the ego vehicle is on its level even if it passes over the route later.

@@ -7,7 +7,7 @@
 use avastra_base::geometry::{Sweep, Vec2, first_contact};
 
 use super::right_of_way::Ruling;
-use super::world::DT_S;
+use crate::state::time::DT_S;
 
 /// The ego vehicle touched an obstacle that it did not touch in the tick before.
 #[derive(Debug, Clone, Copy, PartialEq)]

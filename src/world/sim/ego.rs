@@ -9,8 +9,8 @@ use avastra_base::geometry::{Frame, OrientedBox, Pose, Vec2, unit_vector, wrap_a
 use avastra_base::kinematics::GRAVITY_MPS2;
 use avastra_lang::model::SPEED_MPS_MAX;
 
-use super::sense::EgoMotion;
-use super::trace::Trace;
+use crate::state::sensed::EgoMotion;
+use crate::state::trace::Trace;
 
 /// Pedals and wheel, as a driving system commands them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

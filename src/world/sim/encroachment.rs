@@ -5,7 +5,8 @@ use std::collections::VecDeque;
 use avastra_base::geometry::{OrientedBox, distance_m};
 use avastra_lang::model::TIME_S_MAX;
 
-use super::world::{DT_S, World};
+use super::world::World;
+use crate::state::time::DT_S;
 
 /// How far back it is looked, ticks: 5 s.
 const PAST_TICKS: usize = 250;

@@ -25,8 +25,8 @@
 
 use avastra_lang::model::vocabulary::{Level, Phenomenon, TimeOfDay};
 
-use super::sense::Conditions;
-use super::trace::Trace;
+use crate::state::sensed::Conditions;
+use crate::state::trace::Trace;
 
 /// A camera's light, 1 at noon. Ours: a low sun costs a camera some contrast, twilight lies between it and night, and
 /// street lamps leave it the recognition range that low beams give (35 to 50 %) on few pixels.

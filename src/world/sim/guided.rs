@@ -14,8 +14,8 @@ use super::around::Around;
 use super::body::BodyParameters;
 use super::ego::VehicleParameters;
 use super::road_user::{Moved, Obstacle};
-use super::trace::Trace;
-use super::world::DT_S;
+use crate::state::time::DT_S;
+use crate::state::trace::Trace;
 
 /// How fast one moves to the side that is told no `aside`, m/s. Ours.
 pub const ASIDE_MPS: f64 = 1.0;

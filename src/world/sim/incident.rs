@@ -11,7 +11,7 @@ use avastra_base::geometry::{FirstContact, Frame, Pose, Sweep, Vec2, first_conta
 use avastra_road::is_apart;
 
 use super::road_user::RoadUser;
-use super::world::DT_S;
+use crate::state::time::DT_S;
 
 /// Obstacles whose gap after a tick is at least this are not checked for contact, m: far more than
 /// rounding.

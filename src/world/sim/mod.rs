@@ -29,8 +29,6 @@ mod encroachment;
 mod environment;
 mod guided;
 mod incident;
-mod junction;
-mod lanes;
 mod moment;
 mod npc;
 mod pedestrian;
@@ -38,24 +36,24 @@ mod placement;
 mod right_of_way;
 mod road_user;
 mod safety;
-mod scene;
+
 mod sense;
-#[macro_use]
-mod settings;
-mod signals;
 mod stroller;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
 #[cfg(test)]
 mod tests;
-mod trace;
-mod traffic;
 mod watched;
-mod way;
+
 mod world;
 
 use avastra_lang::model::body;
 
+pub use crate::scene::traffic::{TrafficError, TrafficProfile};
+pub use crate::scene::{RANGE_M, Scene};
+pub use crate::state::sensed::{Conditions, EgoMotion, Sensed, SensedObject, SignalColour};
+pub use crate::state::time::{DT_S, FRAME_S, FRAME_TICKS};
+pub use crate::state::trace::Trace;
 pub use contact::Contact;
 pub use ego::{Control, VehicleParameters, pedal_acceleration_mps2, pedals_for};
 pub use encroachment::Encroachment;
@@ -65,9 +63,5 @@ pub use incident::Incident;
 pub use moment::MomentParts;
 pub use right_of_way::{Mover, Rule, Ruling, right_of_way};
 pub use road_user::{Obstacle, PhaseCount};
-pub use scene::{RANGE_M, Scene};
-pub use sense::{Conditions, EgoMotion, FRAME_S, FRAME_TICKS, Sensed, SensedObject, SignalColour};
-pub use trace::Trace;
-pub use traffic::{TrafficError, TrafficProfile};
 pub use watched::{Watched, WatchedParts};
-pub use world::{DT_S, ENGINE, Start, World};
+pub use world::{ENGINE, Start, World};

@@ -12,9 +12,10 @@ use super::around::Around;
 use super::ego::VehicleParameters;
 use super::npc::Driver;
 use super::road_user::{Motion, Obstacle};
-use super::sense::SignalColour;
 use super::watched::own_lane;
-use super::world::{DT_S, World};
+use super::world::World;
+use crate::state::sensed::SignalColour;
+use crate::state::time::DT_S;
 
 /// Distance that stands for "no road user around", m, as in the published package.
 const NO_ROAD_USER_M: f64 = 100.0;
@@ -248,7 +249,7 @@ pub(super) fn driver_facts(around: &Around, obstacle: &Obstacle, driver: &Driver
     let signal = line.map(|line| line.signal);
     let light = around.light(signal);
     let end_m = way.end_m.map_or(f64::INFINITY, |end_m| end_m - station_m - obstacle.outline.half_length_m);
-    let facts = facts(around, obstacle, way.limit_mps(scene, station_m), junction, light);
+    let facts = facts(around, obstacle, way.limit_mps(&scene.map, station_m), junction, light);
     let junction = scene.map.lane(way.lane_at(station_m).0).junction;
     let in_next_junction = junction.is_some() && junction == around.next_junction();
     let ways_m = driver.ways_to_crossing(2.0 * obstacle.outline.half_length_m, around);

@@ -29,9 +29,9 @@ use avastra_road::is_apart;
 use super::around::{Around, Other};
 use super::ego::VehicleParameters;
 use super::road_user::{Moved, Obstacle};
-use super::sense::FRAME_TICKS;
-use super::trace::Trace;
-use super::world::{DT_S, ticks};
+use crate::state::time::FRAME_TICKS;
+use crate::state::time::{DT_S, ticks};
+use crate::state::trace::Trace;
 
 /// Least time at the kerb before setting out, s (published package).
 const WAIT_S: f64 = 1.0;

@@ -45,15 +45,15 @@
 use avastra_base::geometry::Vec2;
 use avastra_base::kinematics::{STANDING_MPS, WALKING_MPS, stopping_m};
 use avastra_lang::model::vocabulary::{Body, Priority};
-use avastra_road::{LaneIndex, RoadMap, Route, RouteLane};
+use avastra_road::{LaneIndex, RoadMap};
 
 use super::around::Around;
 use super::ego::VehicleParameters;
-use super::junction::{Area, ConflictAreas, Order, order};
 use super::road_user::{Motion, Obstacle};
-use super::sense::SignalColour;
-use super::trace::Trace;
-use super::world::DT_S;
+use crate::scene::junction::{Order, order};
+use crate::state::sensed::SignalColour;
+use crate::state::time::DT_S;
+use crate::state::trace::Trace;
 
 mod crossing;
 mod on_foot;
@@ -128,29 +128,6 @@ fn by_order(map: &RoadMap, ego: LaneIndex, other: LaneIndex) -> (Priority, Rule)
         Order::SameSide => Rule::SameSide,
     };
     (if ego_first { Priority::Ego } else { Priority::Other }, rule)
-}
-
-/// A conflict area on the ego vehicle's route.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct RouteArea {
-    /// The lane of the route.
-    pub lane: LaneIndex,
-    /// Its stations are those of the route.
-    pub area: Area,
-}
-
-/// The conflict areas of a route, by rising station.
-pub(super) fn route_areas(areas: &ConflictAreas, route: &Route) -> Vec<RouteArea> {
-    let of_lane = |part: &RouteLane| {
-        let (lane, from_m) = (part.lane, part.from_m);
-        areas.of(lane).iter().map(move |area| {
-            let area = Area { from_m: from_m + area.from_m, to_m: from_m + area.to_m, ..*area };
-            RouteArea { lane, area }
-        })
-    };
-    let mut all: Vec<RouteArea> = route.lanes.iter().flat_map(of_lane).collect();
-    all.sort_by(|a, b| a.area.from_m.total_cmp(&b.area.from_m).then(a.area.other.cmp(&b.area.other)));
-    all
 }
 
 /// What is remembered of a road user and the ego vehicle, as far as priority depends on it.

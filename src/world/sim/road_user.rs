@@ -18,8 +18,8 @@ use super::npc::{Driver, View};
 use super::pedestrian::Walker;
 use super::right_of_way::{Rights, SIDEWAYS_MPS};
 use super::stroller::Stroller;
-use super::trace::Trace;
-use super::world::{DT_S, ticks};
+use crate::state::time::{DT_S, ticks};
+use crate::state::trace::Trace;
 
 /// How long a wreck stays where it came to rest, s; longer while the ego vehicle sees it.
 const WRECK_S: f64 = 2.0;

@@ -10,9 +10,9 @@ use avastra_lang::model::command::{AsideBy, Command};
 use super::around::Around;
 use super::pedestrian::is_blocked;
 use super::road_user::{Moved, Obstacle};
-use super::sense::FRAME_TICKS;
-use super::trace::Trace;
-use super::world::DT_S;
+use crate::state::time::DT_S;
+use crate::state::time::FRAME_TICKS;
+use crate::state::trace::Trace;
 
 /// How fast somebody steps aside who is told no `aside`, m/s: an adult's walking pace. Ours.
 const ASIDE_MPS: f64 = 1.2;

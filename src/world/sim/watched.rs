@@ -12,9 +12,11 @@ use avastra_road::SignKind;
 use super::around::Around;
 use super::ego::VehicleParameters;
 use super::road_user::Obstacle;
-use super::scene::{Scene, WAY_STEP_M, WayPoints};
-use super::sense::{FRAME_TICKS, SignalColour};
-use super::world::{DT_S, World};
+use super::world::World;
+use crate::scene::{Scene, WAY_STEP_M, WayPoints};
+use crate::state::sensed::SignalColour;
+use crate::state::time::DT_S;
+use crate::state::time::FRAME_TICKS;
 
 /// Whoever is in the ego vehicle's way is nearer to a point than this and half of both outlines, m: half a step, half the
 /// width of the ego vehicle on any heading, and what a bend adds.
@@ -345,35 +347,6 @@ fn over_lane_m(around: &Around) -> f64 {
         }
     };
     (beyond_m - room_m).max(FAR_M)
-}
-
-/// The near edge of the nearest oncoming lane beside a place of the route.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct OncomingEdge {
-    /// From the middle of the route, m.
-    pub away_m: f64,
-    pub is_left: bool,
-    /// Unit vector along the route.
-    pub along: Vec2,
-}
-
-/// The edges at every metre of a route; none in junctions, and where there is no oncoming lane.
-pub(super) fn oncoming_edges(scene: &Scene) -> Vec<Option<OncomingEdge>> {
-    let Scene { map, route, .. } = scene;
-    let edge = |station_m: f64| {
-        let lane = route.lane_at(station_m).lane;
-        if map.lane(lane).junction.is_some() {
-            return None;
-        }
-        let here = route.path.pose_at(station_m);
-        let on_lane_m = map.lane(lane).centre.project(here.position).station_m;
-        let opposing = map.opposing(lane, on_lane_m)?;
-        let other = map.lane(opposing.lane);
-        let aside_m = here.to_local(other.centre.position_at(opposing.station_m)).y;
-        let away_m = aside_m.abs() - other.width_at(opposing.station_m) / 2.0;
-        Some(OncomingEdge { away_m, is_left: aside_m > 0.0, along: unit_vector(here.heading_rad) })
-    };
-    (0..=route.path.length_m() as usize).map(|metre| edge(metre as f64)).collect()
 }
 
 #[cfg(test)]

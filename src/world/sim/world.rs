@@ -17,7 +17,7 @@ use avastra_base::rng::Stream;
 use avastra_lang::model::body::BodyParameters;
 use avastra_lang::model::command::Command;
 use avastra_lang::model::vocabulary::{Body, Level, LightColour, TimeOfDay, TrafficRule};
-use avastra_lang::model::{COMMANDED_MAX, Memory, NpcFacts, Road, Space, TICK_MS};
+use avastra_lang::model::{COMMANDED_MAX, Memory, NpcFacts, Road, Space};
 use avastra_road::{RouteLaneChange, SignKind, is_apart};
 
 use super::ambient::{Ambient, RENEWAL_TICKS, is_gone};
@@ -29,25 +29,17 @@ use super::incident::{Bump, Incident, bump, exchange, impact};
 use super::moment::npc_facts;
 use super::right_of_way::{Passed, light_before, room_before_m};
 use super::road_user::{Moved, Obstacle, PhaseCount, RoadUser};
-use super::scene::Scene;
-use super::sense::{
-    Conditions, EgoMotion, FRAME_S, FRAME_TICKS, Sensed, SensedObject, SignalColour, visible_fraction,
-};
-use super::signals::SignalClock;
-use super::trace::Trace;
-use super::traffic::TrafficProfile;
+use super::sense::visible_fraction;
+use crate::scene::Scene;
+use crate::scene::traffic::TrafficProfile;
+use crate::state::sensed::{Conditions, EgoMotion, Sensed, SensedObject, SignalColour};
+use crate::state::signals::SignalClock;
+use crate::state::time::{DT_S, FRAME_S, FRAME_TICKS, ticks};
+use crate::state::trace::Trace;
 
 /// Name of this simulated world. Raised whenever the same seed no longer gives the same episode and trace, so that an
 /// old scenario is told apart from a refuted one.
 pub const ENGINE: &str = "plane/10";
-
-/// One physics step, s: 50 Hz.
-pub const DT_S: f64 = TICK_MS as f64 / 1000.0;
-
-/// The ticks of a time, to the nearest.
-pub(super) const fn ticks(time_s: f64) -> u64 {
-    (time_s / DT_S + 0.5) as u64
-}
 
 /// What stands farther ahead than this on the route does not block the ego vehicle, m: a queue of five cars.
 const QUEUE_M: f64 = 40.0;

@@ -7,10 +7,10 @@ use avastra_lang::model::command::{AsideBy, Command, IgnoredRules};
 use avastra_lang::model::vocabulary::{LaneChoice, Side};
 use avastra_road::LaneIndex;
 
+use crate::scene::lanes::{chosen_lane, lane_beside, may_use};
 use crate::sim::around::Around;
-use crate::sim::lanes::{chosen_lane, lane_beside, may_use};
 use crate::sim::road_user::Obstacle;
-use crate::sim::trace::Trace;
+use crate::state::trace::Trace;
 
 use super::change::{Whose, duration_s, per_m};
 use super::driver::{Driver, View};
@@ -176,7 +176,7 @@ impl Driver {
 
     /// Whether the lane that is meant is the one that the change under way leaves.
     fn is_leaving(&self, lane: LaneChoice, View { this, around, .. }: &View) -> bool {
-        let meant = chosen_lane(around, around.beside_route(this.outline.pose.position).0, lane);
+        let meant = chosen_lane(around.scene, around.beside_route(this.outline.pose.position).0, lane);
         meant.is_ok_and(|meant| meant == self.way.lane_at(self.station_m).0)
     }
 
@@ -195,9 +195,9 @@ impl Driver {
             return false;
         }
         // The change into the last lane on the way to the one that is meant ends at the place that it was told.
-        let meant = chosen_lane(around, around.beside_route(this.outline.pose.position).0, lane);
+        let meant = chosen_lane(around.scene, around.beside_route(this.outline.pose.position).0, lane);
         let (here, _) = self.way.lane_at(self.station_m);
-        let is_last = meant.ok() == lane_beside(around, here, side);
+        let is_last = meant.ok() == lane_beside(around.scene, here, side);
         let wanted_m = self.aside.as_ref().map_or(0.0, |aside| aside.wanted_m);
         let ends_m = if is_last { wanted_m } else { self.aside_m() };
         if let Some(begun) = self.change_to(side, ends_m, whose, view) {
@@ -222,15 +222,15 @@ impl Driver {
         ignores: IgnoredRules,
         around: &Around,
     ) -> Result<Option<Side>, String> {
-        let meant = chosen_lane(around, around.beside_route(this.outline.pose.position).0, lane)?;
+        let meant = chosen_lane(around.scene, around.beside_route(this.outline.pose.position).0, lane)?;
         let (here, _) = self.way.lane_at(self.station_m);
         let lies = |side: Side| {
-            let next = |lane: &LaneIndex| lane_beside(around, *lane, side);
+            let next = |lane: &LaneIndex| lane_beside(around.scene, *lane, side);
             core::iter::successors(next(&here), next).take(LANES_MAX).any(|lane| lane == meant)
         };
         match () {
             () if here == meant => Ok(None),
-            () if !may_use(around, meant, this.body, ignores) => Err("that lane is for buses".into()),
+            () if !may_use(around.scene, meant, this.body, ignores) => Err("that lane is for buses".into()),
             () if lies(Side::Left) => Ok(Some(Side::Left)),
             () if lies(Side::Right) => Ok(Some(Side::Right)),
             () => Err("that lane does not lie beside its own".into()),

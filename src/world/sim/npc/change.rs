@@ -17,14 +17,14 @@ use avastra_road as road;
 use avastra_road::{Lane, LaneIndex, is_apart};
 
 use crate::action::SpawnRequest;
+use crate::scene::lanes::{lane_beside, may_use};
+use crate::scene::traffic::TrafficProfile;
+use crate::scene::way::{Way, body_at};
 use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
-use crate::sim::lanes::{lane_beside, may_use};
 use crate::sim::moment::{driver_facts, with_itself};
 use crate::sim::road_user::Moved;
-use crate::sim::traffic::TrafficProfile;
-use crate::sim::way::{Way, body_at};
-use crate::sim::world::DT_S;
+use crate::state::time::DT_S;
 
 use super::aside::beside;
 use super::driver::{Driver, SIDE_ROOM_M, View};
@@ -287,8 +287,8 @@ impl Driver {
         let View { this, size, around } = *view;
         let map = &around.scene.map;
         let (here, here_m) = self.way.lane_at(self.station_m);
-        let target = lane_beside(around, here, side)?;
-        if !may_use(around, target, this.body, self.ignores) {
+        let target = lane_beside(around.scene, here, side)?;
+        if !may_use(around.scene, target, this.body, self.ignores) {
             return None;
         }
         let centre = &map.lane(target).centre;
@@ -308,7 +308,7 @@ impl Driver {
         }
         let mut rng = self.draw(this.id, around);
         let turning = self.turn_to_lay(size);
-        let (way, lane) = Way::turning(around.scene, &[target], turning, &mut rng)?;
+        let (way, lane) = Way::turning(&around.scene.roads, &[target], turning, &mut rng)?;
         turning.iter().for_each(|to| self.mean_to_turn(*to, lane));
         Some((way, there.station_m, Some(side)))
     }
@@ -439,8 +439,8 @@ pub(in crate::sim) fn can_change(
     let in_junction = |lane: LaneIndex| map.lane(lane).junction.is_some();
     let ahead = way.lanes_from(station_m).skip_while(|(lane, _)| in_junction(*lane));
     ahead.take_while(|(lane, _)| !in_junction(*lane)).any(|(lane, at_m)| {
-        let Some(target) = lane_beside(around, lane, side) else { return false };
-        if !may_use(around, target, request.body, request.ignores) {
+        let Some(target) = lane_beside(around.scene, lane, side) else { return false };
+        if !may_use(around.scene, target, request.body, request.ignores) {
             return false;
         }
         let here = map.lane(lane).centre.pose_at(at_m).position;

@@ -16,14 +16,14 @@ use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::command::IgnoredRules;
 use avastra_lang::model::vocabulary::{Side, TrafficRule};
 
+use crate::scene::Scene;
+use crate::scene::way::{Way, body_at};
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::road_user::{Moved, Obstacle};
-use crate::sim::scene::Scene;
-use crate::sim::sense::FRAME_TICKS;
-use crate::sim::trace::Trace;
-use crate::sim::way::{Way, body_at};
-use crate::sim::world::DT_S;
+use crate::state::time::DT_S;
+use crate::state::time::FRAME_TICKS;
+use crate::state::trace::Trace;
 
 use super::aside::Aside;
 use super::change::{BrokenOff, Change, PlannedChange};
@@ -125,7 +125,7 @@ impl Driver {
         plan.reverse();
         let (cruise_mps, limit_part) = match cruise {
             Cruise::Commanded(speed_mps) => (speed_mps, None),
-            Cruise::Limit(part) => (part * way.limit_mps(scene, station_m), Some(part)),
+            Cruise::Limit(part) => (part * way.limit_mps(&scene.map, station_m), Some(part)),
         };
         Driver {
             speed_mps: cruise_mps.min(way.speed_mps_max(station_m)),
@@ -225,14 +225,15 @@ impl Driver {
         self.heed_turn(view);
         if self.way.ends_soon(self.station_m) {
             let mut rng = self.draw(this.id, around);
-            if let Some((way, station_m)) = self.way.prolonged(around.scene, self.station_m, &mut rng) {
+            if let Some((way, station_m)) = self.way.prolonged(&around.scene.roads, self.station_m, &mut rng)
+            {
                 self.go_on_along(way, station_m);
             }
         }
         self.note_stop(size);
         self.yields_to_ego = self.is_ambient() && around.traffic.yields_to_ego;
         if let Some(part) = self.limit_part {
-            self.cruise_mps = part * self.way.limit_mps(around.scene, self.station_m);
+            self.cruise_mps = part * self.way.limit_mps(&around.scene.map, self.station_m);
         }
         if self.change.is_none() {
             self.begin_change(view);

@@ -8,8 +8,8 @@
 
 use core::cell::LazyCell;
 
+use crate::scene::way::body_at;
 use crate::sim::road_user::Obstacle;
-use crate::sim::way::body_at;
 use avastra_base::geometry::{OrientedBox, Pose, distance_m};
 use avastra_road::is_apart;
 

@@ -8,9 +8,9 @@ use avastra_base::kinematics::{Following, STANDING_MPS, needed_mps2};
 use avastra_lang::model::vocabulary::TrafficRule;
 use avastra_road::is_apart;
 
+use crate::scene::way::Way;
 use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
-use crate::sim::way::Way;
 
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M, SIDE_ROOM_M, View};
 

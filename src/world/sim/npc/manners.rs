@@ -24,12 +24,12 @@
 
 use core::cell::LazyCell;
 
+use crate::scene::junction::Area;
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
-use crate::sim::junction::Area;
-use crate::sim::sense::SignalColour;
-use crate::sim::world::DT_S;
+use crate::state::sensed::SignalColour;
+use crate::state::time::DT_S;
 use avastra_base::kinematics::{STANDING_MPS, braking_m};
 use avastra_lang::model::vocabulary::TrafficRule;
 

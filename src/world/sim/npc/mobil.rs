@@ -12,12 +12,12 @@ use avastra_base::geometry::Path;
 use avastra_lang::model::vocabulary::Side;
 use avastra_road::{LaneIndex, is_apart};
 
+use crate::scene::traffic::TrafficProfile;
 use crate::sim::around;
-use crate::sim::traffic::TrafficProfile;
 
 use super::driver::{Driver, SIDE_ROOM_M, View};
 use super::leader::{TIME_GAP_S, following};
-use crate::sim::lanes::{lane_beside, may_use};
+use crate::scene::lanes::{lane_beside, may_use};
 
 /// Ticks between two considerations: a second.
 const CONSIDER_TICKS: u64 = 50;
@@ -54,8 +54,8 @@ impl Driver {
         let driver = Idm { acceleration_mps2: size.acceleration_mps2_max, wish_mps: self.cruise_mps };
         let mut best: Option<(f64, Side)> = None;
         for side in [Side::Right, Side::Left] {
-            let may_use = |lane: &LaneIndex| may_use(around, *lane, this.body, self.ignores);
-            let Some(target) = lane_beside(around, here, side).filter(may_use) else { continue };
+            let may_use = |lane: &LaneIndex| may_use(around.scene, *lane, this.body, self.ignores);
+            let Some(target) = lane_beside(around.scene, here, side).filter(may_use) else { continue };
             let target = around.scene.map.lane(target);
             let station_m = target.centre.project(this.outline.pose.position).station_m;
             let height_m = |at_m| target.height_at(at_m);

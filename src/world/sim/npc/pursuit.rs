@@ -11,8 +11,8 @@ use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::guided::EgoKeeps;
 use crate::sim::road_user::Obstacle;
-use crate::sim::trace::Trace;
-use crate::sim::world::DT_S;
+use crate::state::time::DT_S;
+use crate::state::trace::Trace;
 
 use super::driver::{COMFORT_MPS2, Driver, View};
 
@@ -127,7 +127,7 @@ impl Driver {
         let mut pursuit = **self.pursuit.as_ref()?;
         let around = view.around;
         let speed_mps_max =
-            pursuit.speed_mps_max.unwrap_or_else(|| self.way.limit_mps(around.scene, self.station_m));
+            pursuit.speed_mps_max.unwrap_or_else(|| self.way.limit_mps(&around.scene.map, self.station_m));
         let mps2_max = (speed_mps_max.min(bend_mps) - self.speed_mps) / DT_S;
         let wanted_mps2 = match pursuit.aim {
             Aim::Gap(gap, to) => {

@@ -16,7 +16,7 @@ use avastra_road::{Turn, is_apart};
 
 use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
-use crate::sim::world::DT_S;
+use crate::state::time::DT_S;
 
 use super::driver::{Driver, View, choices};
 use super::leader::Leader;

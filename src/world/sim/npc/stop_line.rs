@@ -4,7 +4,7 @@
 
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
-use crate::sim::sense::SignalColour;
+use crate::state::sensed::SignalColour;
 use avastra_base::kinematics::STANDING_MPS;
 
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M};

@@ -5,7 +5,7 @@ use avastra_road::LaneIndex;
 
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
-use crate::sim::trace::Trace;
+use crate::state::trace::Trace;
 
 use super::driver::{Driver, View};
 
@@ -74,7 +74,7 @@ impl Driver {
         let mut lane = self.way.next_turn(map, front_m, to);
         if lane.is_none() {
             let mut rng = self.draw(this.id, around);
-            let turned = self.way.turned(around.scene, (self.station_m, front_m), to, &mut rng);
+            let turned = self.way.turned(&around.scene.roads, (self.station_m, front_m), to, &mut rng);
             if let Some((way, station_m, turns_in)) = turned {
                 self.go_on_along(way, station_m);
                 // It was let go on another way.

@@ -4,13 +4,13 @@
 use avastra_lang::model::vocabulary::{Side, Then, TrafficRule};
 use avastra_road::{Conflict, LaneIndex, StopLine};
 
+use crate::scene::lanes::lane_beside;
+use crate::scene::way::{Way, in_words, leads_through};
 use crate::sim::around::Around;
 use crate::sim::ego::VehicleParameters;
-use crate::sim::lanes::lane_beside;
 use crate::sim::npc::{Driver, PlannedChange, Towards, When, can_change, choices};
-use crate::sim::sense::SignalColour;
-use crate::sim::way::{Way, in_words, leads_through};
-use crate::sim::world::DT_S;
+use crate::state::sensed::SignalColour;
+use crate::state::time::DT_S;
 
 use super::arrival::TIMING_M;
 use super::{Asked, commanded};
@@ -87,7 +87,7 @@ fn standing(asked: &Asked, conflict: &Conflict) -> Result<Driver, String> {
     }
     let lanes = lanes_to(around, conflict, BEYOND_LINE_M + request.behind_first_m + size.length_m);
     let mut rng = choices(around.seed, id, 0);
-    let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
+    let way = Way::along(&around.scene.roads, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
     let enters_m = way.lane_begin_m(conflict.lane).expect("the way was made through this lane");
     let before = enters_m - BEYOND_LINE_M..=enters_m;
     let lines = way.stop_lines.iter().map(|line| line.station_m).chain(way.stop_signs_m.iter().copied());
@@ -122,7 +122,7 @@ fn rendezvous(asked: &Asked, conflict: &Conflict, arrival_s: f64) -> Result<Driv
     let needed_m = request.speed_mps * arrival_s + request.behind_first_m + size.length_m;
     let lanes = lanes_to(around, conflict, needed_m);
     let mut rng = choices(around.seed, id, 0);
-    let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
+    let way = Way::along(&around.scene.roads, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
     let meeting_m = way.lane_begin_m(conflict.lane).expect("the way was made through this lane")
         + conflict.lane_station_m;
     let front_m = approach_m(asked, &way, meeting_m, arrival_s)?;
@@ -142,8 +142,8 @@ fn rendezvous(asked: &Asked, conflict: &Conflict, arrival_s: f64) -> Result<Driv
     let mut reason = "no second lane in the crossing leg";
     let mut found = None;
     for (side, back) in [(Side::Right, Side::Left), (Side::Left, Side::Right)] {
-        let Some(beside) = lane_beside(around, leg, side) else { continue };
-        let first = Way::along(around.scene, &[beside], &mut rng).ok_or("that lane leads nowhere")?;
+        let Some(beside) = lane_beside(around.scene, leg, side) else { continue };
+        let first = Way::along(&around.scene.roads, &[beside], &mut rng).ok_or("that lane leads nowhere")?;
         let station_m = map.lane(beside).centre.project(start).station_m;
         if can_change(around, &first, station_m, back, request) {
             found = Some((first, station_m));

@@ -7,12 +7,12 @@ use avastra_base::rng::Rng;
 use avastra_lang::model::vocabulary::{LaneChoice, Side, Then};
 use avastra_road::LaneIndex;
 
+use crate::scene::lanes::{chosen_lane, lane_along, lane_before, lane_beside, opposing_lane};
+use crate::scene::way::{Way, in_words};
 use crate::sim::around::Around;
 use crate::sim::ego::VehicleParameters;
-use crate::sim::lanes::{chosen_lane, lane_along, lane_before, lane_beside, opposing_lane};
 use crate::sim::npc::{Driver, PlannedChange, Towards, When, can_change, choices};
-use crate::sim::way::{Way, in_words};
-use crate::sim::world::ticks;
+use crate::state::time::ticks;
 
 use super::{Asked, ahead_m, commanded};
 
@@ -34,7 +34,8 @@ pub(super) fn drive_ahead(asked: &Asked) -> Result<Driver, String> {
     if request.lane == LaneChoice::Current && request.distance_m < 0.0 {
         return Err("in the ego vehicle's own lane nobody begins beside it".into());
     }
-    let lane = lane_of_row(asked, station_m, true, |station_m| chosen_lane(around, station_m, request.lane))?;
+    let lane =
+        lane_of_row(asked, station_m, true, |station_m| chosen_lane(around.scene, station_m, request.lane))?;
     let mut rng = choices(around.seed, id, 0);
     let beside_ego = around.scene.route.path.pose_at(station_m).position;
     let station_m = around.scene.map.lane(lane).centre.project(beside_ego).station_m;
@@ -124,7 +125,7 @@ fn change_soon(
 pub(super) fn drive_behind(asked: &Asked) -> Result<Driver, String> {
     let Asked { around, request, id, .. } = *asked;
     let mut rng = choices(around.seed, id, 0);
-    let lane = chosen_lane(around, around.ego_station_m, request.lane)?;
+    let lane = chosen_lane(around.scene, around.ego_station_m, request.lane)?;
     let (lanes, station_m) = from_behind(asked, lane)?;
     let (way, turns_in) = way_of(asked, &lanes, &mut rng)?;
     let plan = change_soon(asked, &way, station_m, lane, &mut rng)?;
@@ -144,7 +145,7 @@ fn from_behind(asked: &Asked, lane: LaneIndex) -> Result<(Vec<LaneIndex>, f64), 
     let mut station_m = beside_m + before_m - request.distance_m - size.length_m / 2.0;
     let mut lanes = vec![lane];
     while station_m < size.length_m / 2.0 {
-        let previous = lane_before(around, lanes[0]).ok_or("the road begins too near behind")?;
+        let previous = lane_before(around.scene, lanes[0]).ok_or("the road begins too near behind")?;
         station_m += map.lane(previous).centre.length_m();
         lanes.insert(0, previous);
     }
@@ -163,7 +164,7 @@ fn way_of(
 ) -> Result<(Arc<Way>, Option<LaneIndex>), String> {
     let Asked { around, request, .. } = *asked;
     let keeps = request.then == Then::Keep;
-    let laid = Way::turning(around.scene, lanes, request.turn.filter(|_| keeps), rng);
+    let laid = Way::turning(&around.scene.roads, lanes, request.turn.filter(|_| keeps), rng);
     let (way, lane) = laid.ok_or("that lane leads nowhere")?;
     match request.turn {
         Some(to) if keeps && lane.is_none() => {
@@ -175,7 +176,7 @@ fn way_of(
 
 /// Why a vehicle in this lane cannot change it.
 fn no_change(around: &Around, lane: LaneIndex) -> &'static str {
-    match [Side::Left, Side::Right].into_iter().all(|side| lane_beside(around, lane, side).is_none()) {
+    match [Side::Left, Side::Right].into_iter().all(|side| lane_beside(around.scene, lane, side).is_none()) {
         true => "no lane beside it to change to",
         false => "no room to change lanes before the junction",
     }
@@ -186,7 +187,7 @@ pub(super) fn overtake(asked: &Asked) -> Result<Driver, String> {
     if request.speed_mps <= around.ego.speed_mps {
         return Err("it would be no faster than the ego vehicle".into());
     }
-    let lane = chosen_lane(around, around.ego_station_m, request.lane)?;
+    let lane = chosen_lane(around.scene, around.ego_station_m, request.lane)?;
     let mut rng = choices(around.seed, id, 0);
     let mut plan = Vec::new();
     let when_ahead = |gap_m, towards| PlannedChange { when: When::AheadOfEgo(gap_m), towards };
@@ -213,14 +214,15 @@ pub(super) fn drive_opposite(asked: &Asked) -> Result<Driver, String> {
     let Asked { around, request, id, .. } = *asked;
     let station_m = ahead_m(asked)?;
     let map = &around.scene.map;
-    let opposing =
-        |station_m| lane_along(around, station_m, false, |lane| opposing_lane(around, lane, station_m));
+    let opposing = |station_m| {
+        lane_along(around.scene, station_m, false, |lane| opposing_lane(around.scene, lane, station_m))
+    };
     let inner = lane_of_row(asked, station_m, false, opposing)?;
     let mut rng = choices(around.seed, id, 0);
     let (lane, plan) = match request.then {
         Then::Keep => (inner, Vec::new()),
         Then::Change => {
-            let second = lane_beside(around, inner, Side::Right).ok_or("no second opposing lane")?;
+            let second = lane_beside(around.scene, inner, Side::Right).ok_or("no second opposing lane")?;
             let when = When::Tick(around.tick);
             (second, vec![PlannedChange { when, towards: Towards::To(Side::Left) }])
         }

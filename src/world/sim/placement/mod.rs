@@ -18,16 +18,16 @@ use avastra_lang::model::Laid;
 use avastra_lang::model::vocabulary::Verb;
 use avastra_road::{LaneIndex, Route};
 
+use crate::scene::lanes::may_use;
+use crate::scene::way::Way;
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::guided::Guided;
-use crate::sim::lanes::may_use;
 use crate::sim::moment::npc_facts;
 use crate::sim::npc::{Cruise, Driver, PlannedChange};
 use crate::sim::road_user::{Motion, Moved, Mover, RoadUser};
 use crate::sim::sense::visible_fraction;
-use crate::sim::way::Way;
 use crate::sim::{body, safety};
 
 pub(super) use arrival::Arrivals;
@@ -81,7 +81,7 @@ pub(super) fn place(
         Verb::Follow => return on_trajectory(&asked),
     };
     let (lane, _) = driver.way.lane_at(driver.station_m);
-    if !may_use(around, lane, request.body, request.ignores) {
+    if !may_use(around.scene, lane, request.body, request.ignores) {
         return Err("that lane is for buses".into());
     }
     driver.begin_at(request.offset_m, request.ignores);

@@ -7,12 +7,10 @@ use avastra_road::LaneIndex;
 
 use super::passed::{Passed, by_stops};
 use super::side::Side;
-use super::{
-    ABRUPT_MPS2, APPROACH_M, Mover, RouteArea, Rule, Ruling, by_lights, by_order, can_stop, room_before_m,
-};
+use super::{ABRUPT_MPS2, APPROACH_M, Mover, Rule, Ruling, by_lights, by_order, can_stop, room_before_m};
+use crate::scene::junction::{Area, RouteArea};
 use crate::sim::around::Around;
 use crate::sim::ego::VehicleParameters;
-use crate::sim::junction::Area;
 use crate::sim::npc::Driver;
 use crate::sim::road_user::{Motion, Obstacle};
 

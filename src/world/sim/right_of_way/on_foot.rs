@@ -7,7 +7,7 @@ use super::{APPROACH_M, Mover, Rule, Ruling, can_stop};
 use crate::sim::around::Around;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::road_user::Obstacle;
-use crate::sim::sense::SignalColour;
+use crate::state::sensed::SignalColour;
 
 /// A pedestrian this near to a crosswalk is on it or about to step on it, m. Ours.
 const KERB_M: f64 = 1.0;

@@ -7,9 +7,9 @@ use avastra_road::{LaneIndex, RoadMap, SignKind, StopLine};
 use super::Rule;
 use crate::sim::around::Around;
 use crate::sim::road_user::{Moved, Obstacle};
-use crate::sim::sense::SignalColour;
-use crate::sim::trace::Trace;
-use crate::sim::world::ticks;
+use crate::state::sensed::SignalColour;
+use crate::state::time::ticks;
+use crate::state::trace::Trace;
 
 /// A driver needs this long to react to yellow, s: the time by which yellow is set (ITE; German RiLSA), as is the braking.
 const YELLOW_REACTION_S: f64 = 1.0;

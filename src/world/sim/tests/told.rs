@@ -8,7 +8,7 @@ use avastra_lang::model::vocabulary::{LaneChoice, TrafficRule, Turning, Verb};
 use avastra_lang::model::{Laid, Trajectory};
 
 use crate::action::{Effect, OnTrajectory, OrderRequest, SpawnRequest, Surroundings};
-use crate::sim::scene::Scene;
+use crate::scene::Scene;
 use crate::sim::testing::request;
 use crate::sim::{DT_S, Obstacle, Start, VehicleParameters, World, testing};
 

@@ -4,9 +4,9 @@ use avastra_lang::model::command::{Command, IgnoredRules, Told};
 use std::sync::Arc;
 
 use crate::action::{Effect, OrderRequest, SpawnRequest, Surroundings};
+use crate::scene::way::body_at;
 use crate::sim::body::BodyParameters;
 use crate::sim::testing::request;
-use crate::sim::way::body_at;
 use crate::sim::{Control, DT_S, Scene, Start, TrafficProfile, World, body, testing};
 use avastra_base::geometry::{OrientedBox, Path, Pose, Vec2, distance_m};
 use avastra_lang::model::vocabulary::{

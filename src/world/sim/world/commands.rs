@@ -11,7 +11,7 @@ use crate::sim::npc::View;
 use crate::sim::placement;
 use crate::sim::placement::Arrivals;
 use crate::sim::road_user::{Advance, Motion, PhaseCount, RoadUser, Running};
-use crate::sim::sense::SignalColour;
+use crate::state::sensed::SignalColour;
 use avastra_lang::model::command::Command;
 use avastra_lang::model::{COMMANDED_MAX, NpcFacts};
 use avastra_road::StopLine;

@@ -7,7 +7,7 @@
 use crate::sim::contact::{Contact, Party, meet};
 use crate::sim::ego::{Control, Ego};
 use crate::sim::road_user::RoadUser;
-use crate::sim::sense::EgoMotion;
+use crate::state::sensed::EgoMotion;
 use avastra_base::geometry::{OrientedBox, Sweep};
 use avastra_road::is_apart;
 

@@ -1,10 +1,10 @@
 //! Traffic put where a test of another module wants it.
 
+use crate::scene::way::Way;
 use crate::sim::World;
 use crate::sim::body::parameters;
 use crate::sim::npc::{Cruise, Driver, choices};
 use crate::sim::road_user::{Motion, Mover, RoadUser};
-use crate::sim::way::Way;
 use avastra_lang::model::vocabulary::{Body, Colour, Verb};
 use avastra_road::LaneIndex;
 
@@ -18,7 +18,7 @@ impl World {
         let next = next.filter(|lane| map.lane(*lane).key.road == through);
         let lanes: Vec<LaneIndex> = [first].into_iter().chain(next).collect();
         let mut rng = choices(self.seed, self.next_id, 0);
-        let way = Way::along(&self.scene, &lanes, &mut rng).expect("the lanes follow each other");
+        let way = Way::along(&self.scene.roads, &lanes, &mut rng).expect("the lanes follow each other");
         let size = parameters(Body::Sedan);
         let driver = Driver::new(&self.scene, way, station_m, Cruise::Commanded(speed_mps), Vec::new());
         let moved = driver.moved(&size);

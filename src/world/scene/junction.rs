@@ -7,7 +7,7 @@
 //! of this (see `right_of_way`).
 
 use avastra_base::geometry::wrap_angle;
-use avastra_road::{Lane, LaneIndex, RoadMap, Turn};
+use avastra_road::{Lane, LaneIndex, RoadMap, Route, RouteLane, Turn};
 
 /// Centre lines nearer than this are in conflict, m: two of the widest bodies (2.44 m) and 0.36 m of
 /// air.
@@ -27,7 +27,7 @@ const ALONGSIDE_RAD_MAX: f64 = 30.0 * core::f64::consts::PI / 180.0;
 
 /// One lane's part of a conflict.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Area {
+pub(crate) struct Area {
     /// Its stretch of the own lane, or of a way along it, m.
     pub from_m: f64,
     pub to_m: f64,
@@ -41,7 +41,7 @@ pub(super) struct Area {
 
 /// The conflict areas of every lane of a map.
 #[derive(Debug, Clone)]
-pub(super) struct ConflictAreas {
+pub(crate) struct ConflictAreas {
     /// By lane index.
     by_lane: Vec<Vec<Area>>,
 }
@@ -110,13 +110,13 @@ fn stretch_near(lane: &Lane, other: &Lane) -> Option<(f64, f64)> {
 }
 
 /// Whether `a` goes before `b`; see [`order`].
-pub(super) fn goes_first(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> bool {
+pub(crate) fn goes_first(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> bool {
     order(map, a, b).0
 }
 
 /// What decides which of two lanes goes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Order {
+pub(crate) enum Order {
     Signs,
     Turning,
     FromTheRight,
@@ -130,7 +130,7 @@ pub(super) enum Order {
 /// traffic; otherwise the vehicle from the right
 /// goes first (Vienna Convention, article 18; so in Estonia and California). Of two from the same side,
 /// the one that turns less goes first; if they turn alike, the lane that the file names first.
-pub(super) fn order(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> (bool, Order) {
+pub(crate) fn order(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> (bool, Order) {
     let (signs_a, signs_b) = (map.lane(a).precedence, map.lane(b).precedence);
     if signs_a != signs_b {
         return (signs_a < signs_b, Order::Signs);
@@ -156,6 +156,29 @@ pub(super) fn order(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> (bool, Order) 
     }
     // A heading turned to the left of the own one comes from the right.
     (angle_rad < 0.0, Order::FromTheRight)
+}
+
+/// A conflict area on the ego vehicle's route.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RouteArea {
+    /// The lane of the route.
+    pub lane: LaneIndex,
+    /// Its stations are those of the route.
+    pub area: Area,
+}
+
+/// The conflict areas of a route, by rising station.
+pub(crate) fn route_areas(areas: &ConflictAreas, route: &Route) -> Vec<RouteArea> {
+    let of_lane = |part: &RouteLane| {
+        let (lane, from_m) = (part.lane, part.from_m);
+        areas.of(lane).iter().map(move |area| {
+            let area = Area { from_m: from_m + area.from_m, to_m: from_m + area.to_m, ..*area };
+            RouteArea { lane, area }
+        })
+    };
+    let mut all: Vec<RouteArea> = route.lanes.iter().flat_map(of_lane).collect();
+    all.sort_by(|a, b| a.area.from_m.total_cmp(&b.area.from_m).then(a.area.other.cmp(&b.area.other)));
+    all
 }
 
 #[cfg(test)]

@@ -7,14 +7,18 @@ use avastra_base::geometry::{Path, Vec2};
 use avastra_lang::model::{CROSSWALK_GAP_M_MAX, Laid, Road, SignalProgram};
 use avastra_road::{FootWay, LaneIndex, Neighbour, RoadMap, Route};
 
-use super::junction::ConflictAreas;
-use super::right_of_way::{RouteArea, route_areas};
-use super::watched::{OncomingEdge, oncoming_edges};
-use super::way::Ways;
+pub(crate) mod junction;
+pub(crate) mod lanes;
+mod oncoming;
+#[macro_use]
+pub(crate) mod settings;
+pub(crate) mod traffic;
+pub(crate) mod way;
 
-/// Objects farther away than this are not sensed at all, m: the clear-day range for cars of the LiDAR and the camera that
-/// driving systems are given.
-pub const RANGE_M: f64 = 120.0;
+use junction::{RouteArea, route_areas};
+use oncoming::{OncomingEdge, oncoming_edges};
+pub use way::RANGE_M;
+use way::Roads;
 
 /// How far vehicles are sensed on a motorway, m: as far as the long-range radar that Apollo takes reaches (Continental ARS
 /// 408-21).
@@ -22,11 +26,11 @@ const MOTORWAY_RANGE_M: f64 = 250.0;
 
 /// The route is looked at in points this far from each other, m, and in so many of them: as far as vehicles are sensed on
 /// motorways.
-pub(super) const WAY_STEP_M: f64 = 10.0;
+pub(crate) const WAY_STEP_M: f64 = 10.0;
 const WAY_POINTS: usize = (MOTORWAY_RANGE_M / WAY_STEP_M) as usize;
 
 /// Points of the route ahead of a station.
-pub(super) struct WayPoints<'a> {
+pub(crate) struct WayPoints<'a> {
     /// Station of the first one, m.
     pub first_m: f64,
     pub points: &'a [Vec2],
@@ -76,13 +80,12 @@ pub struct Scene {
     pub is_motorway: bool,
     /// How far vehicles are sensed, m.
     pub range_m: f64,
-    pub(super) signal_program: SignalProgram,
+    pub(crate) signal_program: SignalProgram,
     /// Where the space's trajectories lie; `None` for those on other maps.
-    pub(super) trajectories: Vec<Option<Laid>>,
-    pub(super) areas: ConflictAreas,
+    pub(crate) trajectories: Vec<Option<Laid>>,
     /// Where the ways of others cross or join the route, by rising station.
-    pub(super) route_areas: Vec<RouteArea>,
-    pub(super) ways: Ways,
+    pub(crate) route_areas: Vec<RouteArea>,
+    pub(crate) roads: Roads,
     foot_ways: FootWays,
     /// Lanes outside junctions, each with the sum of the lengths up to its end, m.
     streets: Vec<(LaneIndex, f64)>,
@@ -119,8 +122,8 @@ impl Scene {
             streets.push((LaneIndex(index), end_m));
         }
         let is_motorway = route.lanes.iter().all(|part| map.lane(part.lane).is_motorway);
-        let areas = ConflictAreas::new(&map);
-        let route_areas = route_areas(&areas, &route);
+        let roads = Roads::new(map.clone());
+        let route_areas = route_areas(&roads.areas, &route);
         let circle = |outline: &[Vec2]| {
             let middle = outline.iter().sum::<Vec2>() / outline.len().max(1) as f64;
             (middle, outline.iter().map(|corner| (corner - middle).norm()).fold(0.0, f64::max))
@@ -142,9 +145,8 @@ impl Scene {
             lane_numbers,
             crosswalk_circles,
             route_crosswalks,
-            areas,
             route_areas,
-            ways: Ways::default(),
+            roads,
             foot_ways: FootWays::default(),
             streets,
             route_points: OnceLock::new(),
@@ -167,7 +169,7 @@ impl Scene {
 
     /// The number of the lane in which somebody at a station and an offset of the route is. The lane in which the route begins has
     /// 0, those to its left 1, 2 and so on; where the route changes lanes, its lane has another number from there on.
-    pub(super) fn lane_number(&self, station_m: f64, offset_m: f64) -> i32 {
+    pub(crate) fn lane_number(&self, station_m: f64, offset_m: f64) -> i32 {
         let mut number = self.route_lane_number(station_m);
         let Some((right_m, left_m)) = self.strip(station_m, number) else { return number };
         if (right_m..=left_m).contains(&offset_m) {
@@ -186,13 +188,13 @@ impl Scene {
     }
 
     /// The number of the route's lane at a station.
-    pub(super) fn route_lane_number(&self, station_m: f64) -> i32 {
+    pub(crate) fn route_lane_number(&self, station_m: f64) -> i32 {
         let after = self.route.lanes.partition_point(|lane| lane.enter_m <= station_m);
         self.lane_numbers[after.max(1) - 1]
     }
 
     /// From where to where the lane of a number reaches beside a station, m to the left of the route; `None` if there is none.
-    pub(super) fn strip(&self, station_m: f64, number: i32) -> Option<(f64, f64)> {
+    pub(crate) fn strip(&self, station_m: f64, number: i32) -> Option<(f64, f64)> {
         let half_m = self.half_width_m(station_m);
         let (here, mut lane) = (self.route.path.position_at(station_m), self.route.lane_at(station_m).lane);
         // In a lane change the route is on its way from one centre to another.
@@ -228,7 +230,7 @@ impl Scene {
     }
 
     /// Distance from a point to the nth crosswalk of the route, m: 0 on it, at most [`CROSSWALK_GAP_M_MAX`].
-    pub(super) fn route_crosswalk_gap_m(&self, nth: usize, point: Vec2) -> f64 {
+    pub(crate) fn route_crosswalk_gap_m(&self, nth: usize, point: Vec2) -> f64 {
         let Some(crosswalk) = self.route_crosswalks.get(nth).copied().flatten() else {
             return CROSSWALK_GAP_M_MAX;
         };
@@ -240,18 +242,18 @@ impl Scene {
     }
 
     /// Points of the route from a station on, as far as it goes and as they are looked at.
-    pub(super) fn points_ahead(&self, station_m: f64) -> WayPoints<'_> {
+    pub(crate) fn points_ahead(&self, station_m: f64) -> WayPoints<'_> {
         self.route_points.get_or_init(|| RoutePoints::new(&self.route.path)).ahead(station_m)
     }
 
     /// The near edge of the oncoming lane beside a station of the route, to the metre.
-    pub(super) fn oncoming_at(&self, station_m: f64) -> Option<OncomingEdge> {
-        let edges = self.oncoming.get_or_init(|| oncoming_edges(self));
+    pub(crate) fn oncoming_at(&self, station_m: f64) -> Option<OncomingEdge> {
+        let edges = self.oncoming.get_or_init(|| oncoming_edges(&self.map, &self.route));
         *edges.get(station_m.max(0.0).round() as usize)?
     }
 
     /// The place at a fraction of all streets laid end to end, so that every metre is equally likely.
-    pub(super) fn street_at(&self, fraction: f64) -> Option<(LaneIndex, f64)> {
+    pub(crate) fn street_at(&self, fraction: f64) -> Option<(LaneIndex, f64)> {
         let at_m = fraction * self.streets.last()?.1;
         let index = self.streets.partition_point(|street| street.1 <= at_m).min(self.streets.len() - 1);
         let begin_m = if index == 0 { 0.0 } else { self.streets[index - 1].1 };
@@ -262,7 +264,7 @@ impl Scene {
     ///
     /// # Errors
     /// Why people do not cross there, in words that complete "cannot spawn: …".
-    pub(super) fn foot_way(&self, station_m: f64) -> Result<FootWay, &'static str> {
+    pub(crate) fn foot_way(&self, station_m: f64) -> Result<FootWay, &'static str> {
         // Even if a thread panicked while it held the lock, the ways in here are whole.
         let known = || self.foot_ways.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(way) = known().get(&station_m.to_bits()) {

@@ -10,9 +10,9 @@ use avastra_lang::model::SignalProgram;
 use avastra_lang::model::vocabulary::LightColour;
 use avastra_road::RoadMap;
 
-use super::sense::SignalColour;
+use super::sensed::SignalColour;
+use super::time::{DT_S, ticks};
 use super::trace::Trace;
-use super::world::{DT_S, ticks};
 
 const GREEN_S: f64 = 12.0;
 const YELLOW_S: f64 = 3.0;
@@ -53,7 +53,7 @@ const REPEAT_S: f64 = 720_720.0 * (GREEN_S + YELLOW_S + ALL_RED_S);
 
 /// Where in its cycle every signal stands at tick 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct SignalClock {
+pub(crate) struct SignalClock {
     offset_ticks: i64,
     program: Program,
 }

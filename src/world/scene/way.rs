@@ -10,9 +10,12 @@ use avastra_base::rng::Rng;
 use avastra_lang::model::vocabulary::Turning;
 use avastra_road::{Heights, Lane, LaneIndex, RoadMap, SignKind, StopLine, Turn};
 
-use super::body::BodyParameters;
-use super::junction::Area;
-use super::scene::{RANGE_M, Scene};
+use super::junction::{Area, ConflictAreas};
+use avastra_lang::model::body::BodyParameters;
+
+/// Objects farther away than this are not sensed at all, m: the clear-day range for cars of the LiDAR and the camera that
+/// driving systems are given.
+pub const RANGE_M: f64 = 120.0;
 
 /// Lateral acceleration that other drivers accept in a bend, m/s²: upper end of comfort.
 const LATERAL_MPS2: f64 = 3.0;
@@ -35,9 +38,23 @@ const BEYOND_ROOM_M: f64 = 4.5;
 /// Number of ways that are kept for a map; each takes some 40 kB.
 const WAYS_MAX: usize = 256;
 
+/// A map, where its lanes are in each other's way, and the ways on it that were asked for.
+#[derive(Debug)]
+pub(crate) struct Roads {
+    pub map: Arc<RoadMap>,
+    pub areas: ConflictAreas,
+    ways: Ways,
+}
+
+impl Roads {
+    pub fn new(map: Arc<RoadMap>) -> Roads {
+        Roads { areas: ConflictAreas::new(&map), ways: Ways::default(), map }
+    }
+}
+
 /// A chain of lanes as a vehicle follows it.
 #[derive(Debug, Clone)]
-pub(super) struct Way {
+pub(crate) struct Way {
     pub path: Path,
     lanes: Vec<WayLane>,
     heights: Heights,
@@ -70,19 +87,19 @@ struct WayLane {
 impl Way {
     /// The way through `lanes`, which must follow each other, and on along successors drawn from
     /// `rng`. `None` without lanes.
-    pub fn along(scene: &Scene, lanes: &[LaneIndex], rng: &mut Rng) -> Option<Arc<Way>> {
-        Way::turning(scene, lanes, None, rng).map(|(way, _)| way)
+    pub fn along(roads: &Roads, lanes: &[LaneIndex], rng: &mut Rng) -> Option<Arc<Way>> {
+        Way::turning(roads, lanes, None, rng).map(|(way, _)| way)
     }
 
     /// As [`Way::along`], but at the first junction after `lanes` to where it is asked to go; and the lane in which it goes
     /// there, if the last of them leads there.
     pub fn turning(
-        scene: &Scene,
+        roads: &Roads,
         lanes: &[LaneIndex],
         to: Option<Turning>,
         rng: &mut Rng,
     ) -> Option<(Arc<Way>, Option<LaneIndex>)> {
-        let map = &scene.map;
+        let map = &roads.map;
         let mut chain = lanes.to_vec();
         let mut last = *lanes.last()?;
         let (mut to, mut turns_in) = (to, None);
@@ -109,11 +126,11 @@ impl Way {
             beyond_m += map.lane(last).centre.length_m();
             chain.push(last);
         }
-        Some((scene.ways.through(scene, chain)?, turns_in))
+        Some((roads.ways.through(roads, chain)?, turns_in))
     }
 
-    fn through(scene: &Scene, chain: &[LaneIndex]) -> Option<Way> {
-        let map = &scene.map;
+    fn through(roads: &Roads, chain: &[LaneIndex]) -> Option<Way> {
+        let map = &roads.map;
         let path = Path::join(chain.iter().map(|lane| &map.lane(*lane).centre))?;
         let mut lanes: Vec<WayLane> = Vec::new();
         let mut stop_lines = Vec::new();
@@ -130,7 +147,7 @@ impl Way {
             stop_lines.extend(lines.map(|line| StopLine { station_m: from_m + line.station_m, ..*line }));
             let stops = lane.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
             stop_signs_m.extend(stops.map(|line| from_m + line.station_m));
-            let on_lane = scene.areas.of(*index).iter();
+            let on_lane = roads.areas.of(*index).iter();
             areas.extend(on_lane.map(|area| Area {
                 from_m: from_m + area.from_m,
                 to_m: from_m + area.to_m,
@@ -203,8 +220,8 @@ impl Way {
     }
 
     /// Speed limit of the lane at a station, m/s.
-    pub fn limit_mps(&self, scene: &Scene, station_m: f64) -> f64 {
-        scene.map.lane(self.lane_at(station_m).0).speed_limit_mps
+    pub fn limit_mps(&self, map: &RoadMap, station_m: f64) -> f64 {
+        map.lane(self.lane_at(station_m).0).speed_limit_mps
     }
 
     /// The lane in which it goes there at the first junction that begins beyond a front.
@@ -246,26 +263,26 @@ impl Way {
     }
 
     /// A longer way that begins with the lane [`BEHIND_M`] behind `station_m`, and that station on the new way.
-    pub fn prolonged(&self, scene: &Scene, station_m: f64, rng: &mut Rng) -> Option<(Arc<Way>, f64)> {
+    pub fn prolonged(&self, roads: &Roads, station_m: f64, rng: &mut Rng) -> Option<(Arc<Way>, f64)> {
         let first = self.first_kept(station_m);
         let rest: Vec<LaneIndex> = self.lanes[first..].iter().map(|part| part.lane).collect();
-        Some((Way::along(scene, &rest, rng)?, station_m - self.lanes[first].from_m))
+        Some((Way::along(roads, &rest, rng)?, station_m - self.lanes[first].from_m))
     }
 
     /// As [`Way::prolonged`], but laid anew from the first junction beyond a front on, where it goes to where it is asked; and
     /// the lane in which it does.
     pub fn turned(
         &self,
-        scene: &Scene,
+        roads: &Roads,
         (station_m, front_m): (f64, f64),
         to: Turning,
         rng: &mut Rng,
     ) -> Option<(Arc<Way>, f64, Option<LaneIndex>)> {
         let first = self.first_kept(station_m);
-        let (_, edge) = self.next_junction(&scene.map, front_m)?;
+        let (_, edge) = self.next_junction(&roads.map, front_m)?;
         let kept = self.lanes[first..].iter().take_while(|part| part.from_m < edge.from_m);
         let kept: Vec<LaneIndex> = kept.map(|part| part.lane).collect();
-        let (way, lane) = Way::turning(scene, &kept, Some(to), rng)?;
+        let (way, lane) = Way::turning(roads, &kept, Some(to), rng)?;
         Some((way, station_m - self.lanes[first].from_m, lane))
     }
 
@@ -281,7 +298,7 @@ fn is_open(map: &RoadMap, from: LaneIndex, next: LaneIndex) -> bool {
 }
 
 /// Whether a lane leads there through a junction.
-pub(super) fn leads_through(map: &RoadMap, lane: LaneIndex, to: Turning) -> bool {
+pub(crate) fn leads_through(map: &RoadMap, lane: LaneIndex, to: Turning) -> bool {
     let lane = map.lane(lane);
     let turn = match to {
         Turning::Left => Turn::Left,
@@ -307,7 +324,7 @@ fn turns(map: &RoadMap, from: LaneIndex, to: Turning) -> impl Iterator<Item = La
 }
 
 /// Where somebody turns, as in "does not lead to the left".
-pub(super) fn in_words(to: Turning) -> &'static str {
+pub(crate) fn in_words(to: Turning) -> &'static str {
     match to {
         Turning::Left => "to the left",
         Turning::Straight => "straight on",
@@ -321,7 +338,7 @@ pub(super) fn in_words(to: Turning) -> &'static str {
 /// way it is the centre's. In a bend the body is a chord of the way: its middle cuts the bend, and its
 /// tail swings out less than if the body turned about its centre. A real rear axle cuts a bend farther;
 /// its driver swings out before to stay in the lane, which is not modelled.
-pub(super) fn body_at(path: &Path, station_m: f64, body: &BodyParameters) -> Pose {
+pub(crate) fn body_at(path: &Path, station_m: f64, body: &BodyParameters) -> Pose {
     let rear_m = station_m - body.rear_axle_m;
     let rear = path.position_at(rear_m);
     let wheelbase = path.position_at(rear_m + body.wheelbase_m) - rear;
@@ -335,16 +352,16 @@ pub(super) fn body_at(path: &Path, station_m: f64, body: &BodyParameters) -> Pos
 /// The ways that were asked for on a map so far, by their lanes. Every row asks for its ways at every
 /// step, and few of them differ.
 #[derive(Debug, Default)]
-pub(super) struct Ways(Mutex<BTreeMap<Vec<LaneIndex>, Arc<Way>>>);
+pub(crate) struct Ways(Mutex<BTreeMap<Vec<LaneIndex>, Arc<Way>>>);
 
 impl Ways {
-    fn through(&self, scene: &Scene, chain: Vec<LaneIndex>) -> Option<Arc<Way>> {
+    fn through(&self, roads: &Roads, chain: Vec<LaneIndex>) -> Option<Arc<Way>> {
         // Even if a thread panicked while it held the lock, the ways in here are whole.
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(way) = known.get(&chain) {
             return Some(Arc::clone(way));
         }
-        let way = Arc::new(Way::through(scene, &chain)?);
+        let way = Arc::new(Way::through(roads, &chain)?);
         if known.len() >= WAYS_MAX {
             known.clear();
         }
@@ -411,7 +428,8 @@ mod tests {
         let scene = testing::crossing();
         let way = |road: &str, lane: i32| {
             let lane = scene.map.place(road, lane, 100.0).expect("it is there").lane;
-            Way::along(&scene, &[lane], &mut rng::stream(1, rng::Stream::Traffic, 0)).expect("it is a lane")
+            Way::along(&scene.roads, &[lane], &mut rng::stream(1, rng::Stream::Traffic, 0))
+                .expect("it is a lane")
         };
         let out = way("6", -1);
         assert!(!out.open && out.end_m.is_none());
