@@ -90,7 +90,8 @@ fn silhouette(eye: Vec2, towards: Vec2, target: &Obstacle) -> (Vec2, Vec2) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use avastra_lang::model::vocabulary::{Colour, Verb};
+    use avastra_base::geometry::Pose;
+    use avastra_lang::model::vocabulary::{Body, Colour, ShownLights, Verb};
 
     fn obstacle(id: u32, body: Body, x_m: f64, y_m: f64) -> Obstacle {
         let size = crate::sim::body::parameters(body);
