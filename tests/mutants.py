@@ -19,6 +19,7 @@ import os
 import random
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import threading
@@ -39,7 +40,7 @@ SUBJECTS = {
         (["src/world/sim/right_of_way.rs", "src/world/sim/right_of_way/*.rs"],
          ["avastra-world", "avastra-campaign"], ["situations::", "verdicts::"]),
         ([f"src/campaign/{name}.rs" for name in ("episode/precrash", "oracle/avoidable", "oracle/counted")],
-         ["avastra-campaign"], ["situations::", "verdicts::", "r157::"]),
+         ["avastra-campaign"], ["situations::", "verdicts::", "r157::", "suites::"]),
         (["src/campaign/episode/monitor.rs"], ["avastra-campaign"], ["situations::", "requirements::"]),
         (["src/campaign/oracle/shrink.rs"], ["avastra-campaign"], ["shrinks::", "sureness::"]),
     ],
@@ -205,16 +206,19 @@ def played(commands, number, limits):
     """`caught` and by which test, `endless`, or `survived`."""
     for (folder, command), limit in zip(commands, limits):
         variables = os.environ | {"MUTANT": str(number), "INSTA_UPDATE": "no", "RUST_TEST_THREADS": "1"}
-        settings = {"cwd": folder, "env": variables, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True, "errors": "replace"}
+        settings = {"cwd": folder, "env": variables, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True, "errors": "replace",
+                    "start_new_session": True}
         with subprocess.Popen(command, **settings) as tests:
-            clock = threading.Timer(limit, tests.kill)
+            # With the commands that it has started: an endless one would go on.
+            end = lambda: os.killpg(tests.pid, signal.SIGKILL)
+            clock = threading.Timer(limit, end)
             clock.start()
             # The first failure is enough.
             failed = next((line for line in tests.stdout if re.match(r"test .*FAILED", line)), None)
             is_late = not clock.is_alive()
             clock.cancel()
             if failed is not None:
-                tests.kill()
+                end()
         if failed is not None:
             return "caught", failed.split()[1]
         if is_late:

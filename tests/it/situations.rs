@@ -138,7 +138,7 @@ fn play(path: &Path) -> Said {
 fn in_full(database: &Connection) -> String {
     let query = "SELECT printf('  %s_%04d %s#%d at %.2f s: %s by %s at %.2f s (%s); %s from %.2f s by %s, %s; %s; %s, harm %.3f%s%s', \
                    road, episode, body, obstacle, time_s, priority, priority_rule, priority_time_s, priority_motion, avoidability, \
-                   hazard_onset_s, avoided_by, coalesce(evasion, 'no evasion'), precrash, shape, harm_share, \
+                   hazard_onset_s, trim(avoided_by || ' to the letter ' || r157_letter), coalesce(evasion, 'no evasion'), precrash, shape, harm_share, \
                    iif(struck, ', struck', ''), iif(sudden, ', sudden', '')), episode, number \
                  FROM collision JOIN episode USING (episode) \
                  UNION ALL SELECT printf('  %s_%04d %s at %.2f to %.2f s, margin %s%s', road, episode, requirement, time_s, until_s, \

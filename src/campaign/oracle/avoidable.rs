@@ -510,3 +510,142 @@ fn is_on_road(world: &World) -> bool {
 fn ticks(duration_s: f64) -> usize {
     (duration_s / DT_S).round() as usize
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use avastra_base::geometry::Vec2;
+    use avastra_world::sim::testing;
+
+    /// Worlds a tick apart in which the ego vehicle has these speeds along +x, m/s.
+    fn moves(speeds_mps: &[f64]) -> Vec<World> {
+        let mut world = testing::world(&testing::straight());
+        let mut x_m = world.ego().rear_axle.position.x;
+        let mut recording = Vec::new();
+        for &speed_mps in speeds_mps {
+            let y_m = world.ego().rear_axle.position.y;
+            let motion = EgoMotion::straight(Pose::new(x_m, y_m, 0.0), speed_mps);
+            let recorded = world.clone();
+            world.tick_placed(motion, &recorded);
+            recording.push(world.clone());
+            x_m += speed_mps * DT_S;
+        }
+        recording
+    }
+
+    fn speeds(parts: &[(f64, usize)]) -> Vec<f64> {
+        parts.iter().flat_map(|(speed_mps, count)| core::iter::repeat_n(*speed_mps, *count)).collect()
+    }
+
+    #[test]
+    fn a_shove_counts_if_it_gave_more_than_half_of_the_way() {
+        let found = |parts: &[(f64, usize)]| {
+            let recording = moves(&speeds(parts));
+            shoved(&recording, recording[recording.len() - 1].ego_outline())
+        };
+        // Its own 2 m/s would have led it 2 of 5 m, its own 3 m/s 3 of 5.
+        assert_eq!(found(&[(2.0, 50), (5.0, 50)]), Some(50));
+        assert_eq!(found(&[(3.0, 50), (5.0, 50)]), None);
+        assert_eq!(found(&[(0.0, 50), (5.0, 50)]), Some(50));
+        assert_eq!(found(&[(5.0, 100)]), None, "nobody shoved it");
+        // As fast as tyres give is no shove.
+        let tyres: Vec<f64> =
+            (0..100).map(|tick| f64::from(tick) * EGO_ACCELERATION_MPS2_MAX * DT_S).collect();
+        let recording = moves(&tyres);
+        assert_eq!(shoved(&recording, recording[99].ego_outline()), None);
+        // The last shove is the one that counts.
+        assert_eq!(found(&[(0.0, 20), (3.0, 30), (7.0, 50)]), Some(50));
+    }
+
+    #[test]
+    fn the_slowest_moment_counts_if_it_is_at_walking_pace() {
+        let found = |parts: &[(f64, usize)], from: usize| crept_from(&moves(&speeds(parts)), from);
+        assert_eq!(found(&[(8.0, 10), (1.0, 10), (8.0, 10)], 0), Some(19), "the last of equal ones");
+        assert_eq!(found(&[(8.0, 10), (1.0, 10), (8.0, 10)], 25), None);
+        assert_eq!(found(&[(8.0, 10), (5.0, 10), (8.0, 10)], 0), None);
+    }
+
+    #[test]
+    fn a_driver_that_gives_way_slows_down_comfortably_before_its_line() {
+        let world = moves(&[10.0]).remove(0);
+        let front_m = VehicleParameters::MKZ.front_m(world.ego_station_m());
+        let held = |line: Option<f64>, speed_mps_max: f64| {
+            let case = Case {
+                recording: &[],
+                from: 0,
+                obstacle: 0,
+                looks_anew: true,
+                speed_mps_max,
+                waits_at_m: line.map(|ahead_m| front_m + ahead_m),
+                keeps_way: false,
+            };
+            case.held(Control { throttle_pct: 80.0, brake_pct: 0.0, steer_rad: 0.1 }, &world)
+        };
+        let free = held(None, f64::INFINITY);
+        for tenth in 0..800 {
+            let ahead_m = f64::from(tenth) / 10.0;
+            let control = held(Some(ahead_m), f64::INFINITY);
+            assert_eq!(control.steer_rad, 0.1);
+            let may_mps = (2.0 * COMFORTABLE_MPS2 * (ahead_m - LINE_GAP_M).max(0.0)).sqrt();
+            let wanted_mps2 = (may_mps.min(careful_mps(&world)) - 10.0) / CATCH_UP_S;
+            let is_braking = wanted_mps2 < -COMFORTABLE_MPS2 / 2.0 && ahead_m > 0.0;
+            assert_eq!(control.brake_pct > 0.0, is_braking, "{ahead_m} m before the line: {control:?}");
+            if is_braking {
+                let (_, brake_pct) = pedals_for(wanted_mps2.max(-CAREFUL_BRAKING_MPS2));
+                assert!(control.throttle_pct == 0.0 && (control.brake_pct - brake_pct).abs() < 1e-9);
+            } else if ahead_m > 0.0 {
+                assert!((control.throttle_pct - pedals_for(wanted_mps2).0.min(80.0)).abs() < 1e-9);
+            }
+        }
+        assert_eq!(held(Some(-1.0), f64::INFINITY), free, "a line that it has passed");
+        // Where it is run into from behind it goes no faster than it went, and slows down comfortably.
+        let slower = held(None, 5.0);
+        assert!(
+            slower.throttle_pct == 0.0 && (slower.brake_pct - pedals_for(-COMFORTABLE_MPS2).1).abs() < 1e-9
+        );
+        // What brakes harder by itself is left alone.
+        let brakes = Case::held(
+            &Case {
+                recording: &[],
+                from: 0,
+                obstacle: 0,
+                looks_anew: true,
+                speed_mps_max: 5.0,
+                waits_at_m: None,
+                keeps_way: false,
+            },
+            Control { throttle_pct: 0.0, brake_pct: 90.0, steer_rad: 0.0 },
+            &world,
+        );
+        assert_eq!(brakes.brake_pct, 90.0);
+    }
+
+    #[test]
+    fn who_brakes_on_the_recorded_path_moves_as_it_was_recorded_until_then() {
+        let recording = moves(&speeds(&[(10.0, 100)]));
+        let begin_m = recording[0].ego().rear_axle.position.x;
+        let mut held = Held::new(&recording);
+        for recorded in &recording[1..21] {
+            assert_eq!(held.step(recorded.ego(), 0.0), recorded.ego());
+        }
+        // 20 ticks at 10 m/s, then 4 m/s² for a second.
+        let mut motion = recording[20].ego();
+        for recorded in &recording[21..71] {
+            motion = held.step(recorded.ego(), 4.0);
+        }
+        assert!(
+            (motion.speed_mps - 6.0).abs() < 1e-9 && (motion.acceleration_mps2 + 4.0).abs() < 1e-9,
+            "{motion:?}"
+        );
+        let way_m = motion.rear_axle.position.x - begin_m;
+        assert!((way_m - (4.0 + 8.0)).abs() < 1e-6, "{way_m}");
+        // Once it brakes, its own speed counts; it does not roll back.
+        let rolls = held.step(recording[71].ego(), 0.0);
+        assert!((rolls.rear_axle.position.x - motion.rear_axle.position.x - 6.0 * DT_S).abs() < 1e-6);
+        for recorded in &recording[72..] {
+            motion = held.step(recorded.ego(), 40.0);
+        }
+        assert_eq!(motion.speed_mps, 0.0);
+        assert!((motion.rear_axle.position - Vec2::new(motion.rear_axle.position.x, -1.75)).norm() < 1e-6);
+    }
+}

@@ -4,7 +4,7 @@ use crate::episode::{Collision, PreCrash, Shape};
 use avastra_base::geometry::{OrientedBox, Vec2};
 use avastra_drivers as ads;
 use avastra_drivers::{Ads, Status};
-use avastra_lang::model::vocabulary::{Body, Verb};
+use avastra_lang::model::vocabulary::{Body, Level, Verb};
 use avastra_lang::model::{Avoidability, BodyWord};
 use avastra_road::testing::{lanes, street};
 use avastra_world::action::Effect;
@@ -49,14 +49,18 @@ const EVENT_S: f64 = 12.0;
 
 /// Drives without brakes, makes `event` happen, and judges the first contact.
 fn judged(event: impl Fn(&mut World)) -> Judgement {
-    let (recording, contact, met) = crashed(event);
+    judged_in(world(), event)
+}
+
+/// As [`judged`], in a world of its own.
+fn judged_in(world: World, event: impl Fn(&mut World)) -> Judgement {
+    let (recording, contact, met) = crashed(world, event);
     let recent = &recording[recording.len().saturating_sub(500)..];
     judge_one(recent, &contact, met)
 }
 
 /// The worlds before the first contact, the contact, and where the ego vehicle was then.
-fn crashed(event: impl Fn(&mut World)) -> (Vec<World>, Contact, OrientedBox) {
-    let mut world = world();
+fn crashed(mut world: World, event: impl Fn(&mut World)) -> (Vec<World>, Contact, OrientedBox) {
     let mut broken = Broken(ads::Idm::new(world.scene()));
     let mut recording: Vec<World> = Vec::new();
     let mut sensed = world.sensed();
@@ -123,7 +127,7 @@ fn between_human_and_machine_lies_the_beyond() {
 
 #[test]
 fn the_hazard_of_a_pedestrian_begins_with_the_first_step() {
-    let (recording, contact, met) = crashed(|world| appear(world, Verb::Walk, 46.0, 1.4));
+    let (recording, contact, met) = crashed(world(), |world| appear(world, Verb::Walk, 46.0, 1.4));
     let walks = |world: &&World| world.obstacle(1).is_some_and(|walker| walker.velocity_mps != Vec2::zeros());
     let first_step_s = recording.iter().find(walks).expect("it walked").time_s();
     let recent = &recording[recording.len().saturating_sub(500)..];
@@ -170,4 +174,25 @@ fn stands(distance_m: f64) -> Avoidability {
 fn un_r157_puts_the_border_of_a_standing_pedestrian_at_24_m() {
     assert_ne!(stands(20.0), Avoidability::Avoidable);
     assert_eq!(stands(28.0), Avoidability::Avoidable);
+}
+
+/// On a wet road nobody brakes with the 7.6 m/s² of a dry one, to the letter of the regulation either.
+#[test]
+fn the_letter_of_un_r157_brakes_no_harder_than_the_road_allows() {
+    let letter = |wet: Level, distance_m: f64| {
+        let road = street("1", [0.0, 0.0, 0.0, 800.0], "-1", "", &lanes(&[(-1, "driving", 3.0, "")]), "");
+        let scene = testing::scene(&road, ("1", -1, 10.0), ("1", -1, 790.0));
+        let world =
+            World::new(scene, &Start { seed: 1, sky: [Level::None, Level::None, wet], ..testing::start() });
+        judged_in(world, |world| appear(world, Verb::Stand, distance_m, 1.0)).r157_letter
+    };
+    let border_m = |wet: Level| {
+        let avoided = (0..80).map(|step| 15.0 + f64::from(step) * 0.5);
+        avoided
+            .into_iter()
+            .find(|distance_m| !letter(wet, *distance_m).is_empty())
+            .expect("far away it is avoided")
+    };
+    let (dry_m, wet_m) = (border_m(Level::None), border_m(Level::High));
+    assert!(wet_m > dry_m + 1.0, "{dry_m} m on a dry road, {wet_m} m on a wet one");
 }

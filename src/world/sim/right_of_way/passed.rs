@@ -272,8 +272,8 @@ mod tests {
             let world = world(yellow_s + since_s);
             shown(0, speed_mps, &world.alone())
         };
-        assert_eq!((at(1.94, 7.0), at(2.06, 7.0)), (Shown::Free, Shown::LateYellow));
-        assert_eq!((at(0.94, 0.0), at(1.06, 0.0)), (Shown::Free, Shown::LateYellow));
+        assert_eq!((at(2.0, 7.0), at(2.02, 7.0)), (Shown::Free, Shown::LateYellow));
+        assert_eq!((at(1.0, 0.0), at(1.02, 0.0)), (Shown::Free, Shown::LateYellow));
         assert_eq!((at(-0.1, 7.0), at(3.5, 7.0)), (Shown::Free, Shown::Red), "green before, red afterwards");
     }
 

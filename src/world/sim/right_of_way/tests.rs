@@ -293,3 +293,14 @@ fn on_foot_the_crosswalk_decides_and_elsewhere_the_time_to_brake() {
     let zebra = testing::zebra();
     assert_eq!(crosses(&zebra, Verb::Stand, 10.0), Priority::Other);
 }
+
+#[test]
+fn who_steps_out_too_late_is_no_surprise_once_the_ego_vehicle_can_stop() {
+    let mut world = testing::world(&testing::straight());
+    drive_to(&mut world, 60.0, 11.0);
+    world.apply(&Effect::Spawn(request(Verb::Stand, 12.0, 1.4))).expect("there is room");
+    let met = contact(&mut world, 2.5).ruling;
+    assert_eq!((met.priority, met.rule, met.mover), (Priority::None, Rule::OnFoot, Mover::Other));
+    // Its moment is that at which the pedestrian stepped out.
+    assert!(world.time_s() - met.time_s > 0.8, "{} s, {met:?}", world.time_s());
+}
