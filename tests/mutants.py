@@ -41,7 +41,7 @@ SUBJECTS = {
          ["avastra-world", "avastra-campaign"], ["situations::", "verdicts::"]),
         ([f"src/campaign/{name}.rs" for name in ("episode/precrash", "oracle/avoidable", "oracle/counted")],
          ["avastra-campaign"], ["situations::", "verdicts::", "r157::", "suites::"]),
-        (["src/campaign/episode/monitor.rs"], ["avastra-campaign"], ["situations::", "requirements::"]),
+        (["src/campaign/episode/monitor.rs"], ["avastra-campaign"], ["situations::", "shrinks::", "requirements::"]),
         (["src/campaign/oracle/shrink.rs"], ["avastra-campaign"], ["shrinks::", "sureness::"]),
     ],
     "rules": [
