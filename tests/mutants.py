@@ -72,8 +72,14 @@ def listed(patterns):
 
 def copy_checkout(changed):
     """Brings the copy to the state of the checkout, touching what differs alone; `changed` are files that are written with changes."""
-    names = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard"], cwd=ROOT, capture_output=True, check=True, text=True).stdout.splitlines()
-    for name in set(names) - changed:
+    command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+    names = set(subprocess.run(command, cwd=ROOT, capture_output=True, check=True, text=True).stdout.splitlines())
+    # Tests read whole folders: what is gone from the checkout must not be there.
+    for path in COPY.rglob("*"):
+        name = str(path.relative_to(COPY))
+        if path.is_file() and not ((ROOT / name).is_file() and name in names):
+            path.unlink()
+    for name in names - changed:
         source, copy = ROOT / name, COPY / name
         if source.is_file() and not (copy.is_file() and copy.read_bytes() == source.read_bytes()):
             copy.parent.mkdir(parents=True, exist_ok=True)
@@ -159,12 +165,12 @@ def refused(messages, files):
     return found
 
 
-def build(lot, count, packages):
+def build(lot, count, crates):
     """Builds as many changes of the lot as are asked for; gives them, how many did not compile, and the test programs."""
     write(COPY / BASE, (ROOT / BASE).read_text() + SWITCH)
     files, chosen, dropped = {name: File(name) for name in {change["file"] for change in lot}}, {}, 0
     known = json.loads(REFUSED.read_text()) if REFUSED.exists() else {}
-    checked = [part for package in packages for part in ("-p", package)]
+    checked = [part for crate in crates for part in ("-p", crate)]
     while True:
         while len(chosen) < count and lot:
             change = lot.pop()
@@ -190,16 +196,16 @@ def build(lot, count, packages):
     done, messages = cargo("test", "--no-run", "--workspace", "--exclude", "avastra-python")
     if done.returncode != 0:
         sys.exit(f"the tests do not compile:\n{done.stderr[-3000:]}")
-    programs = {(message["package_id"], message["target"]["name"]): message["executable"]
-                for message in messages if message.get("reason") == "compiler-artifact" and message.get("executable") and message["profile"]["test"]}
+    built = (message for message in messages if message.get("reason") == "compiler-artifact" and message.get("executable"))
+    programs = {message["target"]["name"]: message["executable"] for message in built if message["profile"]["test"]}
     return list(chosen.values()), dropped, programs
 
 
 def stages(programs, crates, names):
     """Commands that a change must make fail, and the folders that they run in."""
-    units = {name: program for (_, name), program in programs.items()}
-    of_crates = [(COPY / "src" / crate.removeprefix("avastra-"), [units[crate.replace("-", "_")]]) for crate in crates]
-    return of_crates + [(COPY, [units["it"], name]) for name in names]
+    folder = {crate: COPY / "src" / crate.removeprefix("avastra-") for crate in crates}
+    of_crates = [(folder[crate], [programs[crate.replace("-", "_")]]) for crate in crates]
+    return of_crates + [(COPY, [programs["it"], name]) for name in names]
 
 
 def played(commands, number, limits):

@@ -358,7 +358,7 @@ fn keep(
 /// them again.
 fn keep_near(run: &Run, directory: &Directory) -> Result<Vec<PathBuf>, Failure> {
     let RunSettings { agent, without, with, keep, .. } = run.settings();
-    if !oracle::can_replay(run.arena().ads()) {
+    if *keep == 0 || !oracle::can_replay(run.arena().ads()) {
         return Ok(Vec::new());
     }
     let player = Player { command: "run", table: run.table(), agent, without, with };

@@ -14,8 +14,8 @@
 //! could be seen. So the judgement begins with the first violation or visible intention of either.
 //!
 //! The way is the one that the ego vehicle took, as wide as the vehicle and the 0.375 m by which careful drivers
-//! wander (UN R157, Annex 4, Appendix 3); heading for it means to meet it at constant velocity before the
-//! contact. Both compare places alone, not times: a driver may see that two ways cross before it is
+//! wander (UN R157, Annex 4, Appendix 3). An obstacle heads for it if at constant velocity it would meet it before
+//! the contact. Both compare places alone, not times: a driver may see that two ways cross before it is
 //! clear which vehicle will be there first.
 
 use avastra_base::geometry::{OrientedBox, Pose, distance_m};
@@ -121,9 +121,9 @@ pub fn waiting_line_m(world: &World, contact: &Contact) -> Option<f64> {
     (contact.ruling.priority != Priority::Ego && at_junction && line_m < front_m).then_some(line_m)
 }
 
-/// Index of the last moment at which a careful driver could still stop: before the line at which the ego vehicle had to wait
-/// ([`waiting_line_m`]), or where there is none, before the place of a collision in which it had to give way. If the obstacle
-/// came into sight later, index of that moment. The ego vehicle's violation begins there, though it may not be in the junction
+/// Index of the last moment at which a careful driver could still stop. It had to stop before the line at which the ego vehicle
+/// had to wait ([`waiting_line_m`]). Without such a line, it had to stop before the place of a collision in which it had to give
+/// way. If the obstacle came into sight later, index of that moment. The ego vehicle's violation begins there, though it may not be in the junction
 /// yet. `None` if it did not have to give way, or the obstacle was not in sight.
 pub fn last_chance(recording: &[World], contact: &Contact, met: OrientedBox) -> Option<usize> {
     let last = recording.last()?;

@@ -106,9 +106,11 @@ impl Near {
 }
 
 impl Database {
-    /// Up to `most` episodes in which nothing was found: first those with a collision that does not count; then of each
-    /// requirement the one that came nearest to a breach, of each the second, and so on; then those with the shortest time to a
-    /// collision.
+    /// Up to `most` episodes in which nothing was found, in this order:
+    ///
+    /// 1. those with a collision that does not count;
+    /// 2. of each requirement the one that came nearest to a breach, then of each the second, and so on;
+    /// 3. those with the shortest time to a collision.
     ///
     /// # Errors
     /// If the database cannot be read.

@@ -14,7 +14,7 @@ use super::junction::{Area, ConflictAreas};
 use avastra_lang::model::body::BodyParameters;
 
 /// Objects farther away than this are not sensed at all, m: the clear-day range for cars of the LiDAR and the camera that
-/// driving systems are given.
+/// driving systems are given. Beyond the end of a way it is asked that far whether other lanes go on there.
 pub const RANGE_M: f64 = 120.0;
 
 /// Lateral acceleration that other drivers accept in a bend, m/s²: upper end of comfort.

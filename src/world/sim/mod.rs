@@ -15,11 +15,13 @@
 //! 6. Every fifth tick, water rises and drains (`environment`) and lines of sight are worked out (`sense`).
 //!
 //! Between ticks an action may change the sky or the time of day, or make a road user appear
-//! (`World::apply`). `placement` decides where it appears, along which `way`, or why it cannot;
-//! `traffic` holds the manners that a run can change;
-//! `safety` says how much room a careful driver would need. `junction` knows where lanes cross and which
-//! goes first, `signals` the colour of every light at every tick. `moment` says what can be asked about a moment,
-//! `watched` and `encroachment` what requirements ask beside it, `trace` digests the states of all ticks.
+//! (`World::apply`). `placement` decides where it appears, or why it cannot; `safety` says how much room a careful driver
+//! would need. `moment` says what can be asked about a moment, `watched` and `encroachment` what requirements ask
+//! beside it.
+//!
+//! Two modules stand below this one. `scene` has the map, the `way`s on it, where lanes cross and which goes first
+//! (`junction`), and the manners that a run can change (`traffic`). `state` has the time, what is `sensed`, the colour of
+//! every light at every tick (`signals`), and the digest over the states of all ticks (`trace`).
 
 mod ambient;
 mod around;
