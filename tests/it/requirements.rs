@@ -148,6 +148,32 @@ fn breaches_are_those_of_a_naive_monitor() {
     assert!(by_margin > 2, "{by_margin} steps");
 }
 
+/// What pages draw of a requirement: its smallest margin is the one of the log, where each moment counts by itself.
+#[test]
+fn the_margins_over_time_reach_down_to_the_smallest_one() {
+    let (mut compared, mut of_nobody) = (0, 0);
+    for space in ["tests/cases/spaces/requirements.ava", "tests/cases/spaces/requirements_near.ava"] {
+        let run = run_against("idm", space_at(space), 3, 5, &[]);
+        let requirements = run.space().requirements.clone();
+        for number in 0..run.episodes() {
+            let log = run.episode(number);
+            for series in avastra::episode::margins_over_time(&run.setup(number), &log) {
+                let required = &requirements[series.requirement];
+                let told = log.margins.iter().find(|one| one.requirement == series.requirement);
+                let told = told.expect("what is asked has a margin").smallest;
+                let least = series.margins.iter().flatten().copied().reduce(f64::min);
+                let of = format!("{} of {space}, episode {number}", required.name);
+                of_nobody += usize::from(least.is_none());
+                if required.within_ticks == 0 {
+                    assert_eq!(least, told, "{of}");
+                    compared += usize::from(least.is_some());
+                }
+            }
+        }
+    }
+    assert!(compared > 50 && of_nobody > 0, "{compared} compared, {of_nobody} never asked");
+}
+
 /// What of a road user's gap, or of the ego vehicle, a naive monitor notes at every tick: `None` where nothing is asked.
 type Margins = Vec<(f64, Option<f64>)>;
 

@@ -17,11 +17,33 @@ fn each_part_of_a_scenario_is_made_smaller_or_plainer() {
     let found = files(format!("{out}/critical"), "ava");
     let delayed = found.iter().filter(|path| delay_last_step(path)).count();
     assert!(found.len() >= 20 && delayed >= 2, "{delayed} of {}", found.len());
+    expect_snapshot("shrinks", "all", &shrunk(&found));
+}
+
+/// Eight actions of which none is needless, and ambient vehicles that the breach needs while the weather becomes plainer.
+#[test]
+fn what_a_breach_needs_is_kept() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let space = root().join("tests/cases/spaces/shrinkable_breaches.ava").display().to_string();
+    let found = |name: &str, settings: &[&str]| {
+        let out = scratch.path().join(name).display().to_string();
+        let run = ["run", &space, "--ads", "blind", "--seed", "3", "--replays", "6", "--out", &out];
+        done(&[&run[..], settings].concat());
+        files(format!("{out}/critical"), "ava")
+    };
+    let mut all = found("words", &["--with", "few_words", "--episodes", "2"]);
+    all.extend(found("ambient", &["--ambient", "12", "--episodes", "15"]));
+    let told = shrunk(&all);
+    assert!(told.contains("8 of 8 actions") && told.contains("ambient: 11"), "{told}");
+    expect_snapshot("shrinks", "breaches", &told);
+}
+
+/// What becomes of these scenarios.
+fn shrunk(found: &[std::path::PathBuf]) -> String {
     let found: Vec<String> = found.iter().map(|path| path.display().to_string()).collect();
     let found: Vec<&str> = found.iter().map(String::as_str).collect();
     let shrunk = last_line(&done(&[&["shrink", "--format", "json"], &found[..]].concat()));
-    let told = shrunk["scenarios"].as_array().expect("a list").iter().map(in_full);
-    expect_snapshot("shrinks", "all", &told.collect::<String>());
+    shrunk["scenarios"].as_array().expect("a list").iter().map(in_full).collect()
 }
 
 /// Lets the step of a short scenario begin later, if its text has one step.

@@ -278,6 +278,23 @@ mod tests {
     }
 
     #[test]
+    fn a_stop_sign_is_being_run_from_its_lane_to_the_end_of_the_junction() {
+        let map = testing::crossing_of("206", "274").map.clone();
+        let lane = map.place("1", -1, 280.0).expect("it is there").lane;
+        let at = |road: &str, s_m: f64, stood: Option<u64>| {
+            let place = map.place(road, -1, s_m).expect("it is there");
+            let outline = OrientedBox::new(map.lane(place.lane).centre.pose_at(place.station_m), 4.7, 1.9);
+            Passed { sign: Some(PassedSign { lane, stood }), ..Passed::default() }
+                .is_running_stop(&map, &outline)
+        };
+        assert!(at("1", 288.0, None), "it has just passed the line");
+        assert!(at("2", 10.0, None), "it is in the junction");
+        assert!(!at("3", 10.0, None), "it has left the junction");
+        assert!(!at("5", 10.0, None), "another sign belongs to that lane");
+        assert!(!at("2", 10.0, Some(7)), "it has stood");
+    }
+
+    #[test]
     fn to_have_stood_is_to_have_stood_within_five_seconds() {
         let scene = testing::crossing();
         let mut world = World::new(scene, &testing::start());

@@ -119,6 +119,20 @@ fn a_red_light_is_remembered_until_the_contact() {
 }
 
 #[test]
+fn a_conflict_area_counts_once_the_ego_vehicle_is_eighty_metres_before_it() {
+    let scene = testing::crossing();
+    let found = |before_m: f64| {
+        let mut world = testing::world(&scene);
+        drive_to(&mut world, scene.route_areas[0].area.from_m - before_m, 5.0);
+        world.put("4", -1, "5", 300.0, 1.0);
+        let user = world.latest();
+        let vehicle = Vehicle::of(&user.obstacle, &user.mover.motion).expect("it is a vehicle");
+        Crossing::of(&vehicle, &world.alone()).is_some()
+    };
+    assert_eq!([90.0, 80.2, 79.7, 70.0].map(found), [false, false, true, true]);
+}
+
+#[test]
 fn of_two_in_a_lane_the_one_ahead_has_priority() {
     let mut world = testing::world(&testing::straight());
     drive_to(&mut world, 60.0, 10.0);

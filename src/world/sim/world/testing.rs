@@ -30,6 +30,12 @@ impl World {
         self.next_id += 1;
     }
 
+    /// The latest to appear.
+    #[cfg(test)]
+    pub(in crate::sim) fn latest(&self) -> &RoadUser {
+        self.users.last().expect("somebody is there")
+    }
+
     /// The latest to appear is an emergency vehicle under way from now on.
     pub fn sound_siren(&mut self) {
         let latest = self.users.last_mut().expect("somebody is there");
