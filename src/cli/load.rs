@@ -70,7 +70,7 @@ pub fn read_and_check(path: &Path) -> Result<Loaded, Failure> {
     check_read(path, &reader(path))
 }
 
-/// Does the same for one of many files: the spaces that they use are read once.
+/// Reads and checks one of many files; reads each space that they share once.
 pub fn read_and_check_among(path: &Path, known: &mut KnownSpaces) -> Result<Loaded, Failure> {
     judged(path, check::load_among(path, &reader(path), known))
 }

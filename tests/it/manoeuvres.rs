@@ -477,7 +477,7 @@ fn an_ambulance_passes_red_lights_and_is_the_only_one_that_does() {
     let table = wish("ambulance");
     let rows = ["ambulance(from: Left)", "ambulance(from: Right)"].map(|label| row(&table, label));
     let run = run_of(table.space().clone(), 16, 3, &[]);
-    let (mut came, mut ran_red) = (0, 0);
+    let (mut came, mut ran) = (0, 0);
     for episode in 0..run.episodes() {
         let mut choose = |moment: &Moment| {
             let breakers = moment.situation.surroundings.moment().rule_breakers;
@@ -488,18 +488,18 @@ fn an_ambulance_passes_red_lights_and_is_the_only_one_that_does() {
         };
         let mut is_running = false;
         let log = run.play(episode, &mut choose, &mut |world, _, _| {
-            is_running |= world.obstacles().any(|other| world.runs(other.id));
+            is_running |= world.obstacles().any(|other| world.runs_signal(other.id));
         });
         assert_replays(&run, episode, &log);
-        ran_red += usize::from(is_running);
+        ran += usize::from(is_running);
     }
-    assert!(came > 0 && ran_red > 0, "{came} came, {ran_red} episodes with a red light passed");
+    assert!(came > 0 && ran > 0, "{came} came, {ran} episodes in which a light or sign was run");
 }
 
 #[test]
 fn who_runs_into_a_siren_had_to_wait() {
     let table = wish("siren");
-    let (mut came, mut ran_red, mut hit) = (0, 0, 0);
+    let (mut came, mut ran, mut hit) = (0, 0, 0);
     for ads in ["idm", "modular", "reactive"] {
         let run = run_against(ads, table.space().clone(), 24, 3, &[]);
         for episode in 0..run.episodes() {
@@ -511,17 +511,17 @@ fn who_runs_into_a_siren_had_to_wait() {
             let mut is_running = false;
             let log = run.play(episode, &mut choose, &mut |world, _, _| {
                 assert_eq!(world.moment_facts().rule_breakers, 0);
-                is_running |= world.obstacles().any(|other| world.runs(other.id));
+                is_running |= world.obstacles().any(|other| world.runs_signal(other.id));
             });
             assert_replays(&run, episode, &log);
-            ran_red += usize::from(is_running);
+            ran += usize::from(is_running);
             for collision in &log.collisions {
                 assert_ne!(collision.contact.ruling.priority, Priority::Ego, "{ads}: {collision:?}");
                 hit += usize::from(collision.contact.ruling.priority == Priority::Other);
             }
         }
     }
-    assert!(came > 30 && ran_red > 0 && hit > 0, "{came} came, {ran_red} ran a red light, {hit} were hit");
+    assert!(came > 30 && ran > 0 && hit > 0, "{came} came, {ran} ran a red light, {hit} were hit");
 }
 
 #[test]

@@ -1,24 +1,24 @@
 //! Could a careful driver have avoided this collision?
 //!
-//! The world is taken back to the onset of the hazard (see `hazard`), or to the last moment at which an ego vehicle that
-//! had to give way could still stop, if that is earlier, but no further than 8 s. All other
-//! road users then move as recorded until the recorded contact, and after it as they themselves decide.
-//! The ego vehicle, the same car on the same road, is driven by each reference driver in turn, from the speed that a careful
-//! driver would have had there (`lawful`: an ego vehicle that was faster than the limit or its sight allow is slowed to what they
-//! allow), and no faster than that. A driver
-//! watches for some time before it takes over, and knows from the first which lane changes of the route are begun or over.
-//! If none of the careful drivers avoids the collision,
-//! evasive manoeuvres that begin at the onset without any delay are tried.
+//! The world is taken back to the *takeover*: the onset of the hazard (see `hazard`), or the last moment at which an ego
+//! vehicle that had to give way could still stop, if that is earlier, but no further than 8 s. All other road users then move as
+//! recorded until the recorded contact, and after it as they themselves decide. The ego vehicle, the same car on the same
+//! road, is driven by each reference driver in turn, at most as fast as a careful driver would have been there (`lawful`). A
+//! driver watches for 2 s before it takes over, and knows from the first which lane changes of the route are begun or over.
 //!
-//! If none of the careful drivers avoids it from there, and the ego vehicle slowed down to walking pace since, the question is
-//! asked once more from its slowest moment, whatever it did after that: a vehicle that has dealt with the hazard and then
-//! drives on into what stands before it could have stayed. If another road user shoved the ego vehicle, so that most of its way to the contact was
-//! the shove's, the question begins when a careful driver has reacted to the shove: before it there was nothing to avoid.
+//! 1. The careful drivers drive from the takeover.
+//! 2. If none of them avoids the collision, and the ego vehicle slowed down to walking pace since, they drive from its slowest
+//!    moment: a vehicle that has dealt with the hazard and then drives on into what stands before it could have stayed.
+//! 3. If still none avoids it, evasive manoeuvres are tried, which begin at the takeover without any delay.
 //!
-//! Where the ego vehicle had to give way, a driver that takes over before the ego vehicle has begun a lane change begins
-//! none without a look aside: the question is whether staying in the lane would have avoided the collision. Where another
-//! vehicle ran into the rear of an ego vehicle that had priority, no driver goes faster than the ego vehicle did, or leaves the
-//! way that it took: a vehicle need not flee from one behind it, which keeps the distance.
+//! **Shoves.** If another road user shoved the ego vehicle, so that most of its way to the contact was the shove's, the takeover
+//! is when a careful driver has reacted to the shove: before it there was nothing to avoid.
+//!
+//! **Giving way.** Where the ego vehicle had to give way, a driver that takes over before it has begun a lane change begins none
+//! without a look aside: the question is whether staying in the lane would have avoided the collision.
+//!
+//! **Hit from behind.** Where another vehicle ran into the rear of the ego vehicle, no driver goes faster than that did, or leaves
+//! the way that it took: a vehicle need not flee from one behind it, which keeps the distance.
 //!
 //! Beside that, each careful driver is asked to the letter of UN R157 (`r157_letter`): from the first conflict of ways
 //! on, the ego vehicle drives along its recorded path at its recorded speed until the model reacts, and then only
@@ -59,7 +59,7 @@ const KEEPS_M: f64 = 1.0;
 pub(super) const CAREFUL: [&str; 2] = ["cc", "fsm"];
 /// Other drivers that are tried and reported.
 const REPORTED: [&str; 2] = ["rss", "r157"];
-/// No onset is earlier than this before the contact, s. Ours: from 20 m/s a careful driver is at rest within 5 s.
+/// No takeover is earlier than this before the contact, s. Ours: from 20 m/s a careful driver is at rest within 5 s.
 const REWIND_S: f64 = 8.0;
 /// Drivers watch for this long before they take over, s. Ours: longer than any reaction time.
 const WATCH_S: f64 = 2.0;
@@ -69,8 +69,8 @@ const AFTER_S: f64 = 4.0;
 /// An ego vehicle that gains speed faster than this was shoved, m/s². Ours: twice what tyres give.
 const SHOVE_MPS2: f64 = 2.0 * EGO_ACCELERATION_MPS2_MAX;
 
-/// How verdicts are reached. Every run and study records it, so that one that was judged otherwise can be told apart;
-/// nothing else is possible.
+/// How verdicts are reached. Every run and study records it, so that one that was judged otherwise can be told apart; nothing
+/// else is possible. All other constants of the judgement follow from the engine's number, which is recorded, too.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AvoidabilitySettings {
@@ -102,7 +102,7 @@ impl Default for AvoidabilitySettings {
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Judgement {
     pub class: Avoidability,
-    /// The moment from which the verdict's drivers drive, s: the onset of the hazard, or the slowest moment after it.
+    /// When the verdict's drivers take over, s.
     pub onset_s: f64,
     /// Reference drivers that avoid the collision.
     pub avoided_by: Vec<String>,
@@ -132,7 +132,7 @@ pub fn judge_with_drives(
     })
 }
 
-/// What a reference driver does from the onset of a hazard on, until it is clear or touches something.
+/// What a reference driver does from its takeover on, until it is clear, touches something, or leaves the way that it has to keep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReferenceDrive {
     pub name: String,
@@ -189,7 +189,7 @@ fn before_each<T>(
 /// Judges one collision by the worlds before it.
 pub fn judge_one(recording: &[World], contact: &Contact, met: OrientedBox) -> Judgement {
     let last = recording.len() - 1;
-    // No driver can react to what was never in sight: the takeover is then at the last moment.
+    // No driver can react to what was never in sight: it then takes over at the last moment.
     let onset = onset(recording, contact.obstacle, met).unwrap_or(Onset { first: last, conflict: last });
     let earliest = (last + 1).saturating_sub(ticks(REWIND_S));
     let reacts = shoved(recording, met).map(|shove| (shove + ticks(CAREFUL_REACTION_S)).min(last));
@@ -230,8 +230,8 @@ fn crept_from(recording: &[World], from: usize) -> Option<usize> {
     (speed_mps(&slowest) < WALKING_MPS).then_some(slowest)
 }
 
-/// The moment after the last shove (an earlier one counts as the ego vehicle's own speed) from another road user that gave the ego vehicle more than half of its way to the
-/// contact; `met` is its outline there.
+/// The moment after the last shove from another road user, if that gave the ego vehicle more than half of its way to the contact;
+/// `met` is its outline there. An earlier shove counts as the ego vehicle's own speed.
 fn shoved(recording: &[World], met: OrientedBox) -> Option<usize> {
     let mut way_m = 0.0;
     let mut next = met.pose.position;
@@ -263,7 +263,7 @@ fn reference(name: &str, world: &World) -> Box<dyn Ads> {
 #[derive(Clone, Copy)]
 struct Case<'a> {
     recording: &'a [World],
-    /// Index of the onset.
+    /// Index of the takeover.
     from: usize,
     obstacle: u32,
     /// Whether a driver that takes over decides anew about a lane change that has not begun: the ego vehicle had to give way.
@@ -332,14 +332,14 @@ impl<'a> Case<'a> {
             let avoids = self.drive(driver.as_mut(), &mut |world| {
                 let (time_s, pose) = (world.time_s(), world.ego_outline().pose);
                 places.push(DrivenPlace { time_s, pose, speed_mps: world.ego().speed_mps });
-                true
+                self.is_on_way(world)
             });
             ReferenceDrive { name: name.to_owned(), avoids, places }
         };
         CAREFUL.into_iter().chain(REPORTED).map(drive).collect()
     }
 
-    /// Shows a driver the time before the onset.
+    /// Shows a driver the time before the takeover.
     fn show(&self, driver: &mut dyn Ads) {
         let watched = self.from - self.from.min(ticks(WATCH_S));
         let mut sensed = self.recording[watched].sensed();
@@ -356,7 +356,7 @@ impl<'a> Case<'a> {
         let recording = &self.recording[self.from..];
         let mut world = recording[0].clone();
         let mut sensed = world.sensed();
-        let mut held = Held::new(recording);
+        let mut held = RecordedThenBraking::new(recording);
         for recorded in &recording[1..] {
             world.sense(&mut sensed);
             driver.drive(&sensed);
@@ -382,7 +382,7 @@ impl<'a> Case<'a> {
         Some(found.describe())
     }
 
-    /// Drives from the onset on; `false` if there is a collision, or a world is not `allowed`.
+    /// Drives from the takeover on; `false` if there is a collision, or a world is not `allowed`.
     fn drive(&self, driver: &mut dyn Ads, allowed: &mut dyn FnMut(&World) -> bool) -> bool {
         let start = &self.recording[self.from];
         let mut world = start.with_ego_at_most(lawful_mps(start));
@@ -392,7 +392,7 @@ impl<'a> Case<'a> {
         }
         for recorded in &self.recording[self.from + 1..] {
             world.sense(&mut sensed);
-            let control = self.held(driver.drive(&sensed), &world);
+            let control = self.slowed(driver.drive(&sensed), &world);
             if self.is_hit(world.tick_recorded(&control, recorded)) || !self.is_fine(&world, allowed) {
                 return false;
             }
@@ -410,7 +410,7 @@ impl<'a> Case<'a> {
         let mut sensed = world.sensed();
         for _ in 0..ticks(AFTER_S) {
             world.sense(&mut sensed);
-            let control = self.held(driver.drive(&sensed), world);
+            let control = self.slowed(driver.drive(&sensed), world);
             if self.is_hit(world.tick(&control)) || !self.is_fine(world, allowed) {
                 return false;
             }
@@ -419,7 +419,7 @@ impl<'a> Case<'a> {
     }
 
     /// A command with which the ego vehicle goes no faster than a careful driver does here.
-    fn held(&self, control: Control, world: &World) -> Control {
+    fn slowed(&self, control: Control, world: &World) -> Control {
         let front_m = VehicleParameters::MKZ.front_m(world.ego_station_m());
         let waits = self.waits_at_m.filter(|line_m| *line_m > front_m);
         let waits_mps = waits.map_or(f64::INFINITY, |line_m| {
@@ -449,7 +449,7 @@ impl<'a> Case<'a> {
 }
 
 /// An ego vehicle that moves as recorded until a model brakes, and from then on only brakes, on the recorded path.
-struct Held<'a> {
+struct RecordedThenBraking<'a> {
     recording: &'a [World],
     /// Way to each recorded place, m.
     ways_m: Vec<f64>,
@@ -458,14 +458,14 @@ struct Held<'a> {
     braked: Option<(f64, f64)>,
 }
 
-impl<'a> Held<'a> {
-    fn new(recording: &'a [World]) -> Held<'a> {
+impl<'a> RecordedThenBraking<'a> {
+    fn new(recording: &'a [World]) -> RecordedThenBraking<'a> {
         let mut ways_m = vec![0.0];
         for pair in recording.windows(2) {
             let step = pair[1].ego().rear_axle.position - pair[0].ego().rear_axle.position;
             ways_m.push(ways_m[ways_m.len() - 1] + step.norm());
         }
-        Held { recording, ways_m, tick: 0, braked: None }
+        RecordedThenBraking { recording, ways_m, tick: 0, braked: None }
     }
 
     /// The motion at the end of the next tick; `recorded` is the recorded one.
@@ -579,7 +579,7 @@ mod tests {
                 waits_at_m: line.map(|ahead_m| front_m + ahead_m),
                 keeps_way: false,
             };
-            case.held(Control { throttle_pct: 80.0, brake_pct: 0.0, steer_rad: 0.1 }, &world)
+            case.slowed(Control { throttle_pct: 80.0, brake_pct: 0.0, steer_rad: 0.1 }, &world)
         };
         let free = held(None, f64::INFINITY);
         for tenth in 0..800 {
@@ -604,7 +604,7 @@ mod tests {
             slower.throttle_pct == 0.0 && (slower.brake_pct - pedals_for(-COMFORTABLE_MPS2).1).abs() < 1e-9
         );
         // What brakes harder by itself is left alone.
-        let brakes = Case::held(
+        let brakes = Case::slowed(
             &Case {
                 recording: &[],
                 from: 0,
@@ -624,7 +624,7 @@ mod tests {
     fn who_brakes_on_the_recorded_path_moves_as_it_was_recorded_until_then() {
         let recording = moves(&speeds(&[(10.0, 100)]));
         let begin_m = recording[0].ego().rear_axle.position.x;
-        let mut held = Held::new(&recording);
+        let mut held = RecordedThenBraking::new(&recording);
         for recorded in &recording[1..21] {
             assert_eq!(held.step(recorded.ego(), 0.0), recorded.ego());
         }

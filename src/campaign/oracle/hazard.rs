@@ -161,7 +161,7 @@ pub fn last_chance(recording: &[World], contact: &Contact, met: OrientedBox) -> 
 /// Whether the ego vehicle or the obstacle visibly does something that the other need not expect.
 fn is_out_of_order(world: &World, obstacle: &Obstacle) -> bool {
     let map = &world.scene().map;
-    if world.is_astray() || world.ego_runs() || map.is_beyond_middle(&world.ego_outline()) {
+    if world.is_astray() || world.ego_runs_signal() || map.is_beyond_middle(&world.ego_outline()) {
         return true;
     }
     let outline = &obstacle.outline;
@@ -172,8 +172,8 @@ fn is_out_of_order(world: &World, obstacle: &Obstacle) -> bool {
     }
     if obstacle.body.is_vehicle() {
         return obstacle.moves_aside()
-            || world.runs(obstacle.id)
-            || world.intrudes(obstacle.id)
+            || world.runs_signal(obstacle.id)
+            || world.cuts_across_ego(obstacle.id)
             || map.is_beyond_middle(outline);
     }
     let Pose { position, heading_rad } = outline.pose;

@@ -7,10 +7,11 @@
 //! the class of the verdict are the same, and the space's verdict still counts it, or still does not. A breach is the same if
 //! it is one of the same requirement, and a careful driver still keeps that, or still none does.
 //!
-//! It must recur, too, as far as that was tried: a smaller candidate within the 95 % interval of what is shrunk. For a rounder
-//! number nothing is traded: neither recurrence nor the speed of the impact may fall. Replays come last and stop as soon as
+//! It must recur, too, as far as that was tried. A smaller candidate may recur less often, down to the lower end of the 95 %
+//! interval of what is shrunk, and what recurs (`Recurrence::recurs`) still does. For a rounder number nothing is traded: it
+//! recurs as often as what is shrunk, and is no softer than the best candidate so far. Replays come last and stop as soon as
 //! they have decided, because most candidates fail the cheap checks. The result is 1-minimal: if any one step is removed, or
-//! replaced by waiting, the crash is gone or is another one.
+//! replaced by waiting, the crash is gone, is another one, or recurs too rarely.
 
 use crate::episode;
 use crate::episode::{Choice, Collision, EpisodeLog, Moment, Outcome, Script, ScriptedAction, Setup};
@@ -97,8 +98,8 @@ impl Worth {
     }
 }
 
-/// Shrinks what led to a finding in a log that was played from `setup`; `judgements` has one for each collision. What is
-/// found must recur in so many `replays` as it did, 0 if that is not asked.
+/// Shrinks what led to a finding in a log that was played from `setup`; `judgements` has one for each collision. Recurrence is
+/// tried in `replays` replays, 0 if it may fall.
 pub fn shrink(
     setup: &Setup,
     log: &EpisodeLog,
@@ -136,7 +137,7 @@ pub fn shrink(
 }
 
 /// Steps that are not needed for the nth collision of a log: each alone could be removed, or replaced by waiting, and
-/// the collision stays the same and recurs in so many `replays` as it did. Empty if the scenario is 1-minimal.
+/// the collision stays the same, and its recurrence in `replays` replays within its interval. Empty if the scenario is 1-minimal.
 pub fn spare_steps(
     setup: &Setup,
     log: &EpisodeLog,
@@ -216,6 +217,8 @@ struct Search<'a> {
     log: &'a EpisodeLog,
     found: Found,
     worth: Worth,
+    /// How hard the best candidate so far is.
+    best: Worth,
     replays: u32,
     /// How often what is shrunk recurs, once that was asked.
     recurrence: Option<Recurrence>,
@@ -245,7 +248,8 @@ impl<'a> Search<'a> {
             }
         };
         let (whole, worth) = (Candidate::of(setup, log, found), Worth::new(log, found, None));
-        Search { setup, wanted, whole, log, found, worth, replays, recurrence: None, plays: 0 }
+        let best = worth.clone();
+        Search { setup, wanted, whole, log, found, worth, best, replays, recurrence: None, plays: 0 }
     }
 
     /// How often what is shrunk recurs.
@@ -260,23 +264,40 @@ impl<'a> Search<'a> {
         recurrence
     }
 
-    /// As [`Search::keeps`], if it also recurs as it must, and for a rounder number is no softer.
-    fn holds(&mut self, candidate: &Candidate, purpose: For) -> Option<Script> {
+    /// As [`Search::keeps`], if it is worth as much. Returns its script, and how hard it is.
+    fn holds(&mut self, candidate: &Candidate, purpose: For) -> Option<(Script, Worth)> {
         let (kept, script) = self.keeps(candidate, None)?;
-        self.is_worth(candidate, &script, &kept, purpose).then_some(script)
+        let worth = self.worth_of(candidate, &script, &kept, purpose)?;
+        Some((script, worth))
     }
 
-    fn is_worth(&mut self, candidate: &Candidate, script: &Script, kept: &Kept, purpose: For) -> bool {
+    /// How hard a candidate is, if it recurs as it must, and for a rounder number is no softer.
+    fn worth_of(
+        &mut self,
+        candidate: &Candidate,
+        script: &Script,
+        kept: &Kept,
+        purpose: For,
+    ) -> Option<Worth> {
         let worth = Worth::new(&kept.log, kept.found, None);
-        if purpose == For::Roundness && !self.worth.is_no_harder_than(&worth) {
-            return false;
-        }
+        let is_softer = purpose == For::Roundness && !self.best.is_no_harder_than(&worth);
+        (!is_softer && self.recurs(candidate, script, kept, purpose)).then_some(worth)
+    }
+
+    /// Whether a candidate recurs as often as it must.
+    fn recurs(&mut self, candidate: &Candidate, script: &Script, kept: &Kept, purpose: For) -> bool {
         if self.replays == 0 {
             return true;
         }
         let recurrence = self.recurrence();
         let needed = match purpose {
-            For::Size => (recurrence.interval()[0] * f64::from(self.replays)).ceil() as u32,
+            For::Size => {
+                let lowest = (recurrence.interval()[0] * f64::from(recurrence.replays)).ceil() as u32;
+                let still_recurs = |recurred: &u32| Recurrence { recurred: *recurred, ..recurrence }.recurs();
+                (lowest..=recurrence.recurred)
+                    .find(|recurred| !recurrence.recurs() || still_recurs(recurred))
+                    .unwrap_or(recurrence.recurred)
+            }
             For::Roundness => recurrence.recurred,
         };
         let setup = self.begin(candidate);
@@ -344,8 +365,9 @@ impl<'a> Search<'a> {
 
     /// Takes a candidate if it keeps the crash and what that is worth.
     fn take(&mut self, best: &mut Candidate, candidate: Candidate, purpose: For) -> bool {
-        let Some(script) = self.holds(&candidate, purpose) else { return false };
+        let Some((script, worth)) = self.holds(&candidate, purpose) else { return false };
         *best = Candidate { script, ..candidate };
+        self.best = worth;
         true
     }
 
@@ -507,9 +529,10 @@ impl<'a> Search<'a> {
             // A value that the rules have changed is no plainer than the old one.
             let got = script.steps.get(step).and_then(Option::as_ref);
             if got.is_some_and(|got| got.values[index].1 == wanted)
-                && self.is_worth(best, &script, &kept, For::Roundness)
+                && let Some(worth) = self.worth_of(best, &script, &kept, For::Roundness)
             {
                 best.script = script;
+                self.best = worth;
                 return;
             }
         }
@@ -558,7 +581,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rounder_numbers_come_first_and_end_with_the_number_itself() {
+    fn rounder_numbers_come_first() {
         assert_eq!(round(11.28125), [10.0, 11.0, 11.5]);
         assert_eq!(round(12.5), [10.0, 15.0, 13.0]);
         assert_eq!(round(15.0), [20.0]);

@@ -36,18 +36,12 @@ impl FoundIn {
 
     /// In the terminal's list of scenarios: whose recurrence it is, and how bad it is.
     pub fn in_words(&self) -> String {
-        let again = self.recurrence.map(|of| of.in_words());
-        let again = match self.harm {
-            Some(_) => again,
-            None => {
-                Some(again.map_or_else(|| self.in_ticks(), |again| format!("{} {again}", self.in_ticks())))
-            }
-        };
-        again.into_iter().chain(self.harm.clone()).collect::<Vec<_>>().join(", ")
-    }
-
-    fn in_ticks(&self) -> String {
-        format!("`{}`", self.finding)
+        match (&self.harm, self.recurrence) {
+            (Some(harm), Some(recurrence)) => format!("{}, {harm}", recurrence.in_words()),
+            (Some(harm), None) => harm.clone(),
+            (None, Some(recurrence)) => format!("`{}` {}", self.finding, recurrence.in_words()),
+            (None, None) => format!("`{}`", self.finding),
+        }
     }
 
     /// The surest and worst first.

@@ -200,11 +200,11 @@ impl External {
             session.ready(question, "reset", settings.timeouts.reset_s)?;
             return Ok(Outcome::Ready);
         };
-        let is_graceful = settings.on_timeout == OnTimeout::Strict;
+        let waits_for_late = settings.on_timeout == OnTimeout::Strict;
         match session.step(
             question,
             (seq, t_us),
-            Patience { limit_s: settings.timeouts.step_s, is_graceful },
+            Patience { limit_s: settings.timeouts.step_s, waits_for_late },
         )? {
             Some((answer, took_s)) => {
                 self.program.thought(took_s);

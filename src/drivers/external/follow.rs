@@ -1,9 +1,9 @@
 //! From an answer to pedals and wheel: controls as they are, a trajectory by `modular`'s controllers, an acceleration
 //! with steering along the route.
 //!
-//! A driving system that answers with accelerations does not steer, so the lane changes of the route are made here: once there is room, by the rule of
-//! `idm`, and for as long as an indicator is on before. Other road users do not see that indicator: nothing in the world shows
-//! what the ego vehicle is about to do.
+//! A driving system that answers accelerations does not steer, so avastra makes the route's lane changes for it. A change
+//! begins once there has been room for 1 s by the rule of `idm` (`has_gap`). Other road users do not see it coming: nothing in
+//! the world shows what the ego vehicle is about to do.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use crate::kit::{Guide, Helm, Pedals, PedalsConfig, Point, RouteChanges, SpeedRu
 use crate::reference::has_gap;
 use avastra_base::geometry::{Pose, Vec2, wrap_angle};
 use avastra_base::kinematics::needed_mps2;
-use avastra_world::sim::{Control, EgoMotion, FRAME_S, Scene, Sensed, VehicleParameters};
+use avastra_world::sim::{Control, EgoMotion, Scene, Sensed, VehicleParameters};
 
 use super::message::{
     AccelerationMessage, Answer, ControlMessage, EXTREME_MPS2, LaneChangeWord, TrajectoryMessage,
@@ -21,8 +21,6 @@ use super::message::{
 const AFTER_MPS2: f64 = 3.0;
 /// The brake while no answer comes, %: Apollo's, where the planner is late.
 const LOST_BRAKE_PCT: f64 = 50.0;
-/// For how long there has been room, and the indicator is on, before a lane change begins, s. Ours: as `modular` does.
-const INDICATES_S: f64 = 1.0;
 /// Where it must wait for room, it begins to brake when this much is needed, m/s². Ours: comfortable.
 const WAITS_MPS2: f64 = 2.0;
 
@@ -36,8 +34,6 @@ pub struct Follower {
     pub helm: Helm,
     course: Option<Course>,
     changes: RouteChanges,
-    /// For how long there has been room for the next lane change, s.
-    room_s: f64,
 }
 
 /// A trajectory, ready to be followed.
@@ -58,7 +54,6 @@ impl Follower {
             helm: Helm::default(),
             course: None,
             changes: RouteChanges::new(scene, SpeedRules::NONE),
-            room_s: 0.0,
         }
     }
 
@@ -112,29 +107,15 @@ impl Follower {
         Control { throttle_pct: 0.0, brake_pct: LOST_BRAKE_PCT, steer_rad }
     }
 
-    /// Begins the next lane change of the route if it is time, there is room, and the driving system does not say otherwise. As
-    /// `modular`'s `LaneChanges::seek`, with the rule of `idm` for room.
+    /// Begins the next lane change of the route: when the driving system says so, or when there is room if it says nothing.
     fn seek_room(&mut self, wanted: &AccelerationMessage, sensed: &Sensed) {
         let (station_m, speed_mps) = (self.helm.station_m(), sensed.ego.speed_mps);
-        let Some(change) = self.changes.next() else { return };
-        let is_soon = station_m >= change.begin_m - speed_mps * INDICATES_S;
-        let has_room = match wanted.lane_change {
-            Some(LaneChangeWord::Wait) => false,
-            Some(LaneChangeWord::Go) => true,
-            None => {
-                is_soon
-                    && has_gap(self.changes.guide(), &sensed.objects, speed_mps, station_m, change.lateral_m)
-            }
-        };
-        if !has_room {
-            self.room_s = 0.0;
-            return;
-        }
-        let has_indicated = self.room_s >= INDICATES_S || wanted.lane_change == Some(LaneChangeWord::Go);
-        self.room_s += FRAME_S;
-        if has_indicated && self.changes.due(station_m).is_some() {
-            self.changes.begin(station_m);
-            self.room_s = 0.0;
+        match wanted.lane_change {
+            Some(LaneChangeWord::Wait) => self.changes.wait(),
+            Some(LaneChangeWord::Go) => self.changes.begin_if_due(station_m),
+            None => self.changes.seek(station_m, speed_mps, |guide, change| {
+                has_gap(guide, &sensed.objects, speed_mps, station_m, change.lateral_m)
+            }),
         }
     }
 

@@ -62,22 +62,26 @@ pub struct Broken {
     pub detail: String,
 }
 
-/// A moment on the wall clock.
+/// A time limit by the wall clock.
 #[derive(Debug, Clone, Copy)]
-pub struct Deadline(Instant);
+pub struct Deadline {
+    begun: Instant,
+    limit: Duration,
+}
 
 impl Deadline {
+    /// One that begins now.
     pub fn after(limit_s: f64) -> Deadline {
-        Deadline(now() + Duration::from_secs_f64(limit_s))
+        Deadline { begun: now(), limit: Duration::from_secs_f64(limit_s) }
     }
 
-    /// The time since a deadline of `limit_s` was set, s.
-    pub fn taken_s(self, limit_s: f64) -> f64 {
-        limit_s + now().saturating_duration_since(self.0).as_secs_f64() - self.left().as_secs_f64()
+    /// The time since it began, s.
+    pub fn elapsed_s(self) -> f64 {
+        now().saturating_duration_since(self.begun).as_secs_f64()
     }
 
     fn left(self) -> Duration {
-        self.0.saturating_duration_since(now())
+        self.limit.saturating_sub(now().saturating_duration_since(self.begun))
     }
 }
 

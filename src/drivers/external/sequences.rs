@@ -131,7 +131,7 @@ impl Lines {
     }
 
     fn step(&self, session: &mut Session, line: &str) -> Result<(), Failure> {
-        let patience = Patience { limit_s: self.limits.step_s, is_graceful: true };
+        let patience = Patience { limit_s: self.limits.step_s, waits_for_late: true };
         session.step(line, (0, 0), patience).map(drop)
     }
 }

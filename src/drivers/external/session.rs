@@ -9,9 +9,10 @@ use super::message::{Answer, AnswerKind, Close, ERROR_CHARS_MAX, Init, PROTOCOL,
 use super::schema::Schema;
 use super::settings::ExternalSettings;
 
-/// An answer that is late is waited for so many times the limit, and so many late answers are allowed in an episode: a busy
-/// machine stops a sound program for a second now and then, and what hangs never answers. Ours.
+/// A late answer is waited for this many times the limit longer: a busy machine stops a sound program for a second now and
+/// then, and what hangs never answers. Ours.
 const GRACE_LIMITS: f64 = 5.0;
+/// Late answers that are allowed in an episode. Ours.
 const LATE_MAX: u32 = 3;
 
 /// A trajectory reaches at least this far beyond its step, µs.
@@ -50,8 +51,8 @@ pub struct Session {
 #[derive(Debug, Clone, Copy)]
 pub struct Patience {
     pub limit_s: f64,
-    /// Whether one that is late is waited for, too.
-    pub is_graceful: bool,
+    /// Whether a late answer is waited for.
+    pub waits_for_late: bool,
 }
 
 impl Session {
@@ -117,42 +118,45 @@ impl Session {
         &mut self,
         line: &str,
         (seq, t_us): (u64, u64),
-        Patience { limit_s, is_graceful }: Patience,
+        Patience { limit_s, waits_for_late }: Patience,
     ) -> Result<Option<(Answer, f64)>, Failure> {
         let wanted = self.identity.answer.name();
         self.link.send(line);
         let deadline = Deadline::after(limit_s);
         let mut found = self.answer(wanted, Some(seq), deadline);
-        if is_graceful && matches!(found, Err(Broken { problem: Problem::NoAnswer, .. })) {
-            self.late += 1;
-            found = match self.late > LATE_MAX {
-                true => Err(no_answer(format!(
-                    "more than {LATE_MAX} answers of this episode came later than {limit_s} s (`timeouts.step`)"
-                ))),
-                false => {
-                    let more_s = GRACE_LIMITS * limit_s;
-                    let nor = || {
-                        no_answer(format!(
-                            "no answer within {limit_s} s (`timeouts.step`), nor in {more_s} s more"
-                        ))
-                    };
-                    let more = self.answer(wanted, Some(seq), Deadline::after(more_s));
-                    more.map_err(|broken| if broken.problem == Problem::NoAnswer { nor() } else { broken })
-                }
-            };
+        if waits_for_late && matches!(found, Err(Broken { problem: Problem::NoAnswer, .. })) {
+            found = self.late_answer(wanted, seq, limit_s);
         }
         let result = match found {
             Ok(answer) => {
                 self.answered = Some(seq);
-                judged(answer, t_us).map(|answer| Some((answer, deadline.taken_s(limit_s))))
+                judged(answer, t_us).map(|answer| Some((answer, deadline.elapsed_s())))
             }
-            Err(Broken { problem: Problem::NoAnswer, .. }) if !is_graceful => {
+            Err(Broken { problem: Problem::NoAnswer, .. }) if !waits_for_late => {
                 self.missed = true;
                 Ok(None)
             }
             Err(broken) => Err(broken),
         };
         result.map_err(|broken| failed(&mut self.link, broken, format!("step {seq}")))
+    }
+
+    /// Waits on for an answer that did not come within `limit_s`, if not too many of the episode were late.
+    fn late_answer(&mut self, wanted: &str, seq: u64, limit_s: f64) -> Result<Answer, Broken> {
+        self.late += 1;
+        if self.late > LATE_MAX {
+            return Err(no_answer(format!(
+                "more than {LATE_MAX} answers of this episode came later than {limit_s} s (`timeouts.step`)"
+            )));
+        }
+        let more_s = GRACE_LIMITS * limit_s;
+        let answer = self.answer(wanted, Some(seq), Deadline::after(more_s));
+        answer.map_err(|broken| match broken.problem {
+            Problem::NoAnswer => {
+                no_answer(format!("no answer within {limit_s} s (`timeouts.step`), nor in {more_s} s more"))
+            }
+            _ => broken,
+        })
     }
 
     /// Sends a line that is no step and waits for its answer, that of a type.

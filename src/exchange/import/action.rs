@@ -38,7 +38,7 @@ pub enum ActKind {
 
 impl Act {
     /// Whether it changes nothing where its goal is reached already.
-    pub fn is_the_same_again(&self) -> bool {
+    pub fn is_idempotent(&self) -> bool {
         match &self.kind {
             ActKind::Speed(Speed::Absolute(_), dynamics) => !dynamics.is_continuous,
             ActKind::Lane(Target::Lane(_), ..) | ActKind::Offset(Aside::InLane(_), _) => true,

@@ -51,10 +51,10 @@ impl<'a> Cast<'a> {
     ) -> Option<Sequence<'e>> {
         let sequence = self.estimated(source, moving, events);
         for pair in sequence.events.windows(2) {
-            sequence.keeps_order(source, moving, &pair[0], &pair[1])?;
+            sequence.refuse_out_of_order(source, moving, &pair[0], &pair[1])?;
         }
         for (nth, (event, times)) in sequence.events.iter().enumerate() {
-            self.is_stopped_by_nothing(source, moving, &sequence, (event, times))?;
+            self.refuse_if_stopped(source, moving, &sequence, (event, times))?;
             let like = |kind: fn(&Act) -> bool| event.acts.iter().any(kind);
             let (told_speed, told_aside) = (like(is_speed), like(is_aside));
             let is_like = |act: &Act| told_speed && is_speed(act) || told_aside && is_aside(act);
@@ -66,7 +66,7 @@ impl<'a> Cast<'a> {
     }
 
     /// Refuses an event that the stop trigger of its act may cut short or keep from coming.
-    fn is_stopped_by_nothing(
+    fn refuse_if_stopped(
         &self,
         source: &mut Source,
         moving: &Moving<'a>,
@@ -155,7 +155,7 @@ impl<'a> Cast<'a> {
 
 impl<'e> Sequence<'e> {
     /// Refuses an event that is not known to come after the one that stands before it.
-    fn keeps_order(
+    fn refuse_out_of_order(
         &self,
         source: &mut Source,
         moving: &Moving,

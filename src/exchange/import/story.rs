@@ -564,7 +564,7 @@ impl Entity {
             self.events.push(event);
             return;
         }
-        if event.acts.iter().all(Act::is_the_same_again) {
+        if event.acts.iter().all(Act::is_idempotent) {
             source.note(
                 "what a file lets happen several times happens once, where its goal is the same each time",
             );

@@ -143,7 +143,7 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
     load_knowing(root, read, cache, None)
 }
 
-/// Does the same as [`load`], and takes spaces from earlier loads.
+/// Reads and checks one of many files; takes the spaces that earlier ones used from `known`.
 ///
 /// # Errors
 /// As [`load`].

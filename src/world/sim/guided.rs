@@ -107,8 +107,9 @@ impl Meeting {
         })
     }
 
-    /// By how much it misses the moment at least, with a body that gains and loses speed at most so fast, m/s², if the ego vehicle
-    /// keeps its speed, s: below 0 if it is too soon even if it brakes. `None` once the ego vehicle has not kept its speed.
+    /// The least error of its arrival if the ego vehicle keeps its speed, s: above 0 if it is late even at full speed, below 0 if it
+    /// is early even if it brakes. `gains_mps2` and `loses_mps2` are the limits of its body. `None` once the ego vehicle has not
+    /// kept its speed.
     fn late_s(
         &mut self,
         station_m: f64,
@@ -128,20 +129,25 @@ impl Meeting {
             _ => (own_m, 0.0, f64::INFINITY),
         };
         let squared = |mps: f64| mps * mps;
-        let (gain_m, loss_m) = (2.0 * gains_mps2, 2.0 * loses_mps2);
-        let reached_mps = (squared(speed_mps) + gain_m * way_m).sqrt();
+        let (gain_twice_mps2, loss_twice_mps2) = (2.0 * gains_mps2, 2.0 * loses_mps2);
+        let reached_mps = (squared(speed_mps) + gain_twice_mps2 * way_m).sqrt();
         let soonest_s = if reached_mps <= end_mps {
             (reached_mps - speed_mps) / gains_mps2
         } else {
             // It gains speed up to some point, and then loses it again; one that is too fast only loses it.
-            let top_m = way_m + squared(speed_mps) / gain_m + squared(end_mps) / loss_m;
-            let top_mps = (top_m / (1.0 / gain_m + 1.0 / loss_m)).sqrt().max(speed_mps);
-            let lost_mps = top_mps - (squared(top_mps) - loss_m * way_m).max(squared(end_mps)).sqrt();
+            let top_m = way_m + squared(speed_mps) / gain_twice_mps2 + squared(end_mps) / loss_twice_mps2;
+            let top_mps = (top_m / (1.0 / gain_twice_mps2 + 1.0 / loss_twice_mps2)).sqrt().max(speed_mps);
+            let lost_mps =
+                top_mps - (squared(top_mps) - loss_twice_mps2 * way_m).max(squared(end_mps)).sqrt();
             (top_mps - speed_mps) / gains_mps2 + lost_mps / loses_mps2
         };
         // One that can stop before the place may be there as late as it wants to.
-        let slowed = squared(speed_mps) - loss_m * way_m;
-        let latest_s = if slowed < 0.0 { f64::INFINITY } else { (speed_mps - slowed.sqrt()) / loses_mps2 };
+        let slowed_mps_squared = squared(speed_mps) - loss_twice_mps2 * way_m;
+        let latest_s = if slowed_mps_squared < 0.0 {
+            f64::INFINITY
+        } else {
+            (speed_mps - slowed_mps_squared.sqrt()) / loses_mps2
+        };
         let (too_late_s, too_soon_s) = (soonest_s + steady_s - left_s, latest_s + steady_s - left_s);
         Some(if too_late_s > 0.0 { too_late_s } else { too_soon_s.min(0.0) })
     }

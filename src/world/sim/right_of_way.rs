@@ -61,7 +61,7 @@ mod passed;
 mod ruling;
 mod side;
 
-use crossing::{Crossing, Vehicle, intrudes};
+use crossing::{Crossing, Vehicle, cuts_across};
 use on_foot::{Strip, on_foot};
 use side::{Side, beyond_middle};
 
@@ -206,7 +206,7 @@ impl Rights {
     }
 
     /// Whether the road user drives into a junction across the route of the ego vehicle, which goes first there.
-    pub fn is_intruding(
+    pub fn cuts_across_ego(
         &self,
         this: &Obstacle,
         motion: &Motion,
@@ -214,7 +214,7 @@ impl Rights {
         around: &Around,
     ) -> bool {
         let vehicle = Vehicle::of(this, motion);
-        vehicle.is_some_and(|vehicle| intrudes(&vehicle, [ego_passed, &self.passed], around))
+        vehicle.is_some_and(|vehicle| cuts_across(&vehicle, [ego_passed, &self.passed], around))
     }
 
     /// Who goes first, as long as what was found about the two holds.
@@ -242,24 +242,25 @@ impl Rights {
     /// Which of the two had priority, when they touch at `point`.
     pub fn at_contact(&self, this: &Obstacle, motion: &Motion, point: Vec2, around: &Around) -> Ruling {
         let found = self.held(around.tick);
-        let (ruling, could_stop) = match Vehicle::of(this, motion) {
+        let (ruling, could_stop, duty) = match Vehicle::of(this, motion) {
             Some(vehicle) => {
                 let by_lane = || {
                     let beyond = || beyond_middle(this, around, Some(point));
                     Side::of(&vehicle, around)?.at_contact(beyond, around.time_s())
                 };
-                (found.or_else(by_lane), self.foreseen.is_some())
+                (found.or_else(by_lane), self.foreseen.is_some(), Rule::Standing)
             }
             None => {
                 let by_time = || on_foot(this, &Strip::of(this, around), around);
-                (Some(found.unwrap_or_else(by_time)), around.ego.speed_mps <= WALKING_MPS)
+                let could_stop = around.ego.speed_mps <= WALKING_MPS;
+                (Some(found.unwrap_or_else(by_time)), could_stop, Rule::OnFoot)
             }
         };
         let none = Ruling { time_s: around.time_s(), ..Ruling::default() };
         let ruling = ruling.unwrap_or(none);
         // A driver must be able to stop for anything that can be foreseen (13.1), so then neither has priority.
         if could_stop && ruling.priority == Priority::Ego {
-            return Ruling { priority: Priority::None, rule: Rule::Standing, ..ruling };
+            return Ruling { priority: Priority::None, rule: duty, ..ruling };
         }
         ruling
     }

@@ -526,8 +526,8 @@ impl World {
 
     /// Whether the ego vehicle is in a junction that it was not allowed to enter: at red, late at yellow, or past a stop sign
     /// without having stood.
-    pub fn ego_runs(&self) -> bool {
-        self.ego_passed.is_running(&self.scene.map, &self.ego.outline)
+    pub fn ego_runs_signal(&self) -> bool {
+        self.ego_passed.is_running_signal(&self.scene.map, &self.ego.outline)
     }
 
     /// This world with an ego vehicle that drives no faster than so.
@@ -572,18 +572,20 @@ impl World {
     }
 
     /// Whether the road user with an id drives into a junction across the route of the ego vehicle, which goes first there.
-    pub fn intrudes(&self, id: u32) -> bool {
+    pub fn cuts_across_ego(&self, id: u32) -> bool {
         let around = self.alone();
         let user = self.user(id);
         user.is_some_and(|RoadUser { obstacle, mover }| {
-            mover.rights.is_intruding(obstacle, &mover.motion, &self.ego_passed, &around)
+            mover.rights.cuts_across_ego(obstacle, &mover.motion, &self.ego_passed, &around)
         })
     }
 
-    /// As [`World::ego_runs`], of the road user with an id.
-    pub fn runs(&self, id: u32) -> bool {
+    /// As [`World::ego_runs_signal`], of the road user with an id.
+    pub fn runs_signal(&self, id: u32) -> bool {
         let user = self.user(id);
-        user.is_some_and(|user| user.mover.rights.passed.is_running(&self.scene.map, &user.obstacle.outline))
+        user.is_some_and(|user| {
+            user.mover.rights.passed.is_running_signal(&self.scene.map, &user.obstacle.outline)
+        })
     }
 
     /// Whether the ego vehicle has left its lane without a contact: the middle of its rear axle is beside it. During a

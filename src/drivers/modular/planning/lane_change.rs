@@ -10,7 +10,7 @@ use crate::kit::{Guide, RouteChanges};
 use crate::status::Reason;
 use avastra_base::geometry::{Beside, smooth_step};
 use avastra_road::RouteLaneChange;
-use avastra_world::sim::{FRAME_S, Scene, VehicleParameters};
+use avastra_world::sim::{Scene, VehicleParameters};
 
 use super::super::config::PlanningConfig;
 use super::super::prediction::Forecast;
@@ -18,10 +18,6 @@ use super::speed::Constraint;
 
 /// Vehicles farther away along the road do not matter, m: the greatest gap that is asked for in a town.
 const LOOK_M: f64 = 200.0;
-
-/// Time for which a lane must have been clear, s: a new track takes almost half of it to be published.
-/// Apollo waits as long after a failed attempt.
-const CLEAR_S: f64 = 1.0;
 
 /// A change of which a greater part is done is carried through: the outline is half over the line. Ours.
 const BREAK_OFF_PART: f64 = 0.35;
@@ -34,30 +30,18 @@ const LONG_AGO_M: f64 = -1e6;
 pub struct LaneChanges {
     /// Which changes have begun.
     pub route: RouteChanges,
-    /// For how long the target lane of the next change has been clear, s.
-    clear_s: f64,
 }
 
 impl LaneChanges {
     pub fn new(config: &PlanningConfig, scene: &Arc<Scene>) -> LaneChanges {
-        LaneChanges { route: RouteChanges::new(scene, config.speed_rules()), clear_s: 0.0 }
+        LaneChanges { route: RouteChanges::new(scene, config.speed_rules()) }
     }
 
     /// Begins the next change if it is due and its lane is clear.
     pub fn seek(&mut self, config: &PlanningConfig, station_m: f64, speed_mps: f64, forecasts: &[Forecast]) {
-        let Some(change) = self.route.next() else { return };
-        let soon = station_m >= change.begin_m - speed_mps * CLEAR_S && !self.route.is_under_way(station_m);
-        let lateral_m = |_| change.lateral_m;
-        if !soon || !is_clear(config, self.route.guide(), &lateral_m, station_m, speed_mps, forecasts) {
-            self.clear_s = 0.0;
-            return;
-        }
-        let begins = self.route.due(station_m).is_some() && self.clear_s >= CLEAR_S;
-        self.clear_s += FRAME_S;
-        if begins {
-            self.route.begin(station_m);
-            self.clear_s = 0.0;
-        }
+        self.route.seek(station_m, speed_mps, |guide, change| {
+            is_clear(config, guide, &|_| change.lateral_m, station_m, speed_mps, forecasts)
+        });
     }
 
     /// Breaks off the change that is under way if it must and can be. Returns how far beside the source lane the
@@ -91,7 +75,6 @@ impl LaneChanges {
         let done_m = |at_m: f64| change.postponed_offset_m(at_m, begin_m) - change.source_offset_m(at_m);
         let found = (done_m(station_m), done_m(station_m + 0.5) - done_m(station_m - 0.5));
         self.route.take_back(index);
-        self.clear_s = 0.0;
         Some(found)
     }
 

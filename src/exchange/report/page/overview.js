@@ -65,7 +65,7 @@ function nothingShown(overview) {
   const sums = overview?.totals;
   const isCalm = sums?.counted === 0 && sums.failed === 0 && sums.episodes_with_breach === 0;
   return isCalm
-    ? "No scenario was written: nothing that counts happened. `avastra run --keep 3` keeps the nearest misses to look at."
+    ? "No scenario was written: nothing that counts happened. `avastra run --keep 3` keeps three episodes to look at: collisions that do not count, then the nearest misses."
     : "None of the scenarios can be shown here.";
 }
 

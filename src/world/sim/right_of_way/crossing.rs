@@ -66,7 +66,7 @@ impl<'a> Vehicle<'a> {
         })
     }
 
-    /// Whether its front is in a junction, or within so much of one, m.
+    /// Whether its front is in a junction, or at most `within_m` before one.
     fn is_entering(&self, within_m: f64, around: &Around) -> bool {
         let outline = &self.this.outline;
         let reach_m = outline.half_length_m + within_m;
@@ -92,7 +92,7 @@ impl<'a> Vehicle<'a> {
             }
             Course::Path(path, station_m) => {
                 let lane = &around.scene.map.lane(area.other).centre;
-                // It goes through the area as a vehicle on the lane does, or in some other way that is nobody's.
+                // A path that does not follow this lane goes through the area in another way, which no rule is about.
                 let along = |on_lane_m: f64| {
                     let pose = lane.pose_at(on_lane_m);
                     let found = path.project(pose.position);
@@ -237,7 +237,7 @@ fn by_rules(lanes: [LaneIndex; 2], passed: [&Passed; 2], around: &Around) -> (Pr
 }
 
 /// Whether a vehicle drives into a junction across the route of the ego vehicle, which goes first there.
-pub(super) fn intrudes(vehicle: &Vehicle, passed: [&Passed; 2], around: &Around) -> bool {
+pub(super) fn cuts_across(vehicle: &Vehicle, passed: [&Passed; 2], around: &Around) -> bool {
     // One that has stood before the junction and sets out shows its intention before it is in it.
     let within_m = if passed[1].just_stood(around).is_some() { SETS_OUT_M } else { 0.0 };
     if vehicle.speed_mps < STANDING_MPS || vehicle.has_siren || !vehicle.is_entering(within_m, around) {

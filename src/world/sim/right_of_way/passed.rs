@@ -99,7 +99,7 @@ impl Passed {
     }
 
     /// As [`Passed::is_running_red`], for a late yellow light, too, and for a stop sign that was passed without standing.
-    pub fn is_running(&self, map: &RoadMap, outline: &OrientedBox) -> bool {
+    pub fn is_running_signal(&self, map: &RoadMap, outline: &OrientedBox) -> bool {
         let light = self.light.filter(|light| light.shown != Shown::Free);
         light.is_some_and(|light| light.is_at(map, outline)) || self.is_running_stop(map, outline)
     }

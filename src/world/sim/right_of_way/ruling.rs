@@ -37,71 +37,64 @@ pub enum Rule {
 impl Rule {
     /// The rule in a word, as it stands in tables.
     pub fn name(self) -> &'static str {
-        match self {
-            Rule::None => "none",
-            Rule::Siren => "siren",
-            Rule::Light => "light",
-            Rule::BothLights => "both_lights",
-            Rule::StopSign => "stop_sign",
-            Rule::FirstToStop => "first_to_stop",
-            Rule::Sign => "sign",
-            Rule::Turning => "turning",
-            Rule::FromTheRight => "from_the_right",
-            Rule::SameSide => "same_side",
-            Rule::Clearing => "clearing",
-            Rule::Backing => "backing",
-            Rule::Entering => "entering",
-            Rule::TurningRound => "turning_round",
-            Rule::LeavingLane => "leaving_lane",
-            Rule::BothLeaveLanes => "both_leave_lanes",
-            Rule::Middle => "middle",
-            Rule::BothBeyondMiddle => "both_beyond_middle",
-            Rule::Distance => "distance",
-            Rule::Overtaking => "overtaking",
-            Rule::Standing => "standing",
-            Rule::Wreck => "wreck",
-            Rule::Crosswalk => "crosswalk",
-            Rule::SteppingOut => "stepping_out",
-            Rule::OnFoot => "on_foot",
-        }
+        self.row().0
     }
 
-    /// The rule in a sentence, with its article.
-    pub fn text(self) -> &'static str {
+    /// The rule in a word, and in a sentence with its article.
+    fn row(self) -> (&'static str, &'static str) {
         match self {
-            Rule::None => "no rule of the road tells them apart",
-            Rule::Siren => "an emergency vehicle under way goes first (article 34)",
-            Rule::Light => {
-                "a vehicle that passes a red light, or yellow though it could stop, gives way (article 23)"
+            Rule::None => ("none", "no rule of the road tells them apart"),
+            Rule::Siren => ("siren", "an emergency vehicle under way goes first (article 34)"),
+            Rule::Light => (
+                "light",
+                "a vehicle that passes a red light, or yellow though it could stop, gives way (article 23)",
+            ),
+            Rule::BothLights => ("both_lights", "both passed a red light (article 23)"),
+            Rule::StopSign => (
+                "stop_sign",
+                "a vehicle that passes its stop sign without standing gives way (article 10 of the signs)",
+            ),
+            Rule::FirstToStop => {
+                ("first_to_stop", "of two that stop at signs, the one that stood first goes first")
             }
-            Rule::BothLights => "both passed a red light (article 23)",
-            Rule::StopSign => {
-                "a vehicle that passes its stop sign without standing gives way (article 10 of the signs)"
-            }
-            Rule::FirstToStop => "of two that stop at signs, the one that stood first goes first",
-            Rule::Sign => "signs say which road gives way (article 18)",
+            Rule::Sign => ("sign", "signs say which road gives way (article 18)"),
             Rule::Turning => {
-                "a vehicle that turns across the road gives way to oncoming traffic (article 16)"
+                ("turning", "a vehicle that turns across the road gives way to oncoming traffic (article 16)")
             }
-            Rule::FromTheRight => "the vehicle that comes from the nearside goes first (article 18)",
-            Rule::SameSide => "of two from one side, the one that turns less goes first",
-            Rule::Clearing => "a vehicle that entered in good time may clear the junction (article 18)",
-            Rule::Backing => "a vehicle that backs up gives way (article 14)",
-            Rule::Entering => "a vehicle that comes from beside the road gives way (article 12)",
-            Rule::TurningRound => "a vehicle that turns round or crosses the lanes gives way (article 14)",
-            Rule::LeavingLane => "a vehicle that leaves its lane gives way (articles 11 and 14)",
-            Rule::BothLeaveLanes => "both leave their lanes (article 14)",
-            Rule::Middle => "a vehicle beyond the middle of the road gives way (articles 10 and 12)",
-            Rule::BothBeyondMiddle => "both are beyond the middle of the road (articles 10 and 12)",
-            Rule::Distance => "a vehicle behind another keeps its distance (article 13)",
-            Rule::Overtaking => "a vehicle that passes another leaves room (article 11)",
-            Rule::Standing => "a driver stops for a vehicle that stands in sight (article 13)",
-            Rule::Wreck => "a driver stops for a wreck in sight (article 13)",
-            Rule::Crosswalk => "a pedestrian on a crosswalk goes first (article 21)",
-            Rule::SteppingOut => "a pedestrian does not step out too near (article 20)",
-            Rule::OnFoot => {
-                "a pedestrian crosses with regard, a driver stops for one in sight (articles 13, 20 and 21)"
+            Rule::FromTheRight => {
+                ("from_the_right", "the vehicle that comes from the nearside goes first (article 18)")
             }
+            Rule::SameSide => ("same_side", "of two from one side, the one that turns less goes first"),
+            Rule::Clearing => {
+                ("clearing", "a vehicle that entered in good time may clear the junction (article 18)")
+            }
+            Rule::Backing => ("backing", "a vehicle that backs up gives way (article 14)"),
+            Rule::Entering => {
+                ("entering", "a vehicle that comes from beside the road gives way (article 12)")
+            }
+            Rule::TurningRound => {
+                ("turning_round", "a vehicle that turns round or crosses the lanes gives way (article 14)")
+            }
+            Rule::LeavingLane => {
+                ("leaving_lane", "a vehicle that leaves its lane gives way (articles 11 and 14)")
+            }
+            Rule::BothLeaveLanes => ("both_leave_lanes", "both leave their lanes (article 14)"),
+            Rule::Middle => {
+                ("middle", "a vehicle beyond the middle of the road gives way (articles 10 and 12)")
+            }
+            Rule::BothBeyondMiddle => {
+                ("both_beyond_middle", "both are beyond the middle of the road (articles 10 and 12)")
+            }
+            Rule::Distance => ("distance", "a vehicle behind another keeps its distance (article 13)"),
+            Rule::Overtaking => ("overtaking", "a vehicle that passes another leaves room (article 11)"),
+            Rule::Standing => ("standing", "a driver stops for a vehicle that stands in sight (article 13)"),
+            Rule::Wreck => ("wreck", "a driver stops for a wreck in sight (article 13)"),
+            Rule::Crosswalk => ("crosswalk", "a pedestrian on a crosswalk goes first (article 21)"),
+            Rule::SteppingOut => ("stepping_out", "a pedestrian does not step out too near (article 20)"),
+            Rule::OnFoot => (
+                "on_foot",
+                "a pedestrian crosses with regard, a driver stops for one in sight (articles 13, 20 and 21)",
+            ),
         }
     }
 }
@@ -146,6 +139,17 @@ impl Ruling {
         both || self.priority == Priority::Other
     }
 
+    /// Why, in a sentence without a full stop.
+    fn reason(&self) -> &'static str {
+        match (self.rule, self.priority) {
+            (Rule::Clearing, Priority::None) => {
+                "the other had passed its light or sign, and a driver stops for a vehicle that it sees in the junction (articles 13 and 18)"
+            }
+            (Rule::Wreck, Priority::None) => "a wreck came into the way too late to stop for it (article 13)",
+            (rule, _) => rule.row().1,
+        }
+    }
+
     /// Who has priority, and why, in a sentence without a full stop: `the other had priority: …`.
     pub fn describe(&self) -> String {
         let who = match self.priority {
@@ -158,6 +162,6 @@ impl Ruling {
             Mover::Other => "it came into the ego vehicle's way",
             Mover::Both => "they met",
         };
-        format!("{who}: {}; at {:.1} s {came}", self.rule.text(), self.time_s)
+        format!("{who}: {}; at {:.1} s {came}", self.reason(), self.time_s)
     }
 }
