@@ -219,6 +219,7 @@ impl Drop for Temporary {
 /// # Errors
 /// If it cannot be written; then nothing of it is left.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    sweep_once(folder_of(path));
     let (temporary, mut file) = Temporary::beside(path)?;
     file.write_all(bytes)?;
     // Without this, a loss of power can leave an empty file under the new name.
@@ -246,6 +247,18 @@ pub fn write_named(path: &Path, bytes: &[u8]) -> Result<()> {
     }
     make(folder_of(path))?;
     write(path, bytes)
+}
+
+/// Writes a file anew that lies in a folder which the user named. It keeps its rights and its owner; if there is none, it is made.
+///
+/// # Errors
+/// As [`write_named`], and if it is a link or has further names: who put it there need not be the user.
+pub fn write_anew(path: &Path, bytes: &[u8]) -> Result<()> {
+    match std::fs::symlink_metadata(path) {
+        Ok(found) if found.is_file() && found.nlink() == 1 => write_over(path, &found, bytes),
+        Ok(_) => Err(Error::other("it is a link, or has further names: name the file itself to have it written")),
+        Err(_) => write(path, bytes),
+    }
 }
 
 /// Writes a file anew. Where another file in its place would be less than it was, because it has further names or another owner,

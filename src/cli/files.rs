@@ -40,6 +40,12 @@ pub fn write_again(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<()
     write_named(path, text)
 }
 
+/// Writes a file anew in a folder that the user named, as [`files::write_anew`].
+pub fn write_anew(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<(), Failure> {
+    without_links(path)?;
+    files::write_anew(path, text.as_ref()).map_err(|error| Failure::file("write", path, error))
+}
+
 /// Refuses a place that the user did not name to be written, as [`files::without_links`].
 pub fn without_links(path: &Path) -> Result<(), Failure> {
     files::without_links(path).map_err(|error| Failure::file("write", path, error))

@@ -242,8 +242,8 @@ shrink
   median_actions_before number
   median_steps number
   median_actions number
-  kept number scenarios that keep their verdict and every claim
-  scenarios[] object `file`, `output`, steps and actions before and after, what was kept and traded (`worth_before`, `worth`, the `requirement` of a breach), claims `refuted`
+  kept number scenarios of which every written claim holds
+  scenarios[] object `file`, `output`, steps and actions before and after, what was kept and traded (`worth_before`, `worth`, the `requirement` of a breach), other findings that are `gone`, claims `refuted`
   REPRODUCIBLE
   FAILED
 test

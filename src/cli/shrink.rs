@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use avastra_base::outside::Shown;
 use avastra_campaign::emit;
-use avastra_campaign::episode::{Outcome, Script, Setup};
-use avastra_campaign::oracle::{self, Found, Worth, mixed_text};
+use avastra_campaign::episode::{EpisodeLog, Outcome, Script, Setup};
+use avastra_campaign::oracle::{self, Found, Judgement, Worth, mixed_text};
 use avastra_campaign::run::{self, Asked, EpisodeSummary, Stage};
 use avastra_drivers::Selected;
-use avastra_lang::model::Claim;
+use avastra_lang::model::vocabulary::Word;
+use avastra_lang::model::{Claim, Space};
 
 use super::arguments::ShrinkArguments;
 use super::error::Failure;
@@ -47,6 +48,9 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
     for small in done {
         output.tell(&small.in_words());
         output.tell(&format!("  {}", small.worth_in_words()));
+        if !small.gone.is_empty() {
+            output.tell(&format!("  gone: {}", small.gone.join(", ")));
+        }
         if shrunk.is_single() {
             small.actions_left.iter().for_each(|action| output.tell(&format!("  {action}")));
         }
@@ -56,7 +60,7 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
     let after = median(done.iter().map(|small| small.after));
     if !shrunk.is_single() {
         output.say(&format!(
-            "\n{}: median {} with {} became {} with {}; {kept} keep their verdict and every claim",
+            "\n{}: median {} with {} became {} with {}; every claim of {kept} holds",
             plural(done.len(), "scenario"),
             counted(before.0, "step"),
             counted(before.1, "action"),
@@ -88,6 +92,8 @@ struct Small {
     actions_left: Vec<String>,
     /// What was kept and what was traded, before and after.
     worth: [Worth; 2],
+    /// Other findings of the file that are gone.
+    gone: Vec<String>,
     /// The requirement that is breached still, if the finding is a breach.
     requirement: Option<String>,
     /// Whether the driving system need not repeat itself.
@@ -151,7 +157,7 @@ impl Small {
         serde_json::json!({
             "worth_before": before, "worth": after,
             "file": self.file, "output": self.path, "scenario": self.scenario,
-            "requirement": self.requirement,
+            "requirement": self.requirement, "gone": self.gone,
             "steps_before": self.before.0, "actions_before": self.before.1,
             "steps": self.after.0, "actions": self.after.1,
             "plays": self.plays, "refuted": self.refuted,
@@ -219,6 +225,10 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
         }
         Found::Breach(_) => Vec::new(),
     };
+    let gone = gone([
+        other_findings(table.space(), &log, &judgements, found),
+        other_findings(table.space(), &shrunk.log, &shrunk.judgements, shrunk.found),
+    ]);
     let mut summary = EpisodeSummary::new(table.space(), source.episode, &shrunk.log, shrunk.judgements);
     summary.find_keepers(&setup, &shrunk.log);
     summary.find_recurrence(&setup, &shrunk.script, &shrunk.log, replays);
@@ -256,11 +266,41 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
         after: size(&shrunk.script),
         actions_left: actions.collect(),
         worth,
+        gone,
         requirement,
         is_mixed: ads.program().is_some_and(|program| !program.is_deterministic()),
         plays: shrunk.plays,
         refuted: refuted(output, path, &ads)?,
     })
+}
+
+/// The counted collisions and the breached requirements of a log beside one finding, in words.
+fn other_findings(space: &Space, log: &EpisodeLog, judgements: &[Judgement], found: Found) -> Vec<String> {
+    let others = |index: &usize| found != Found::Collision(*index);
+    let collisions = oracle::counted(space, log, judgements).into_iter().filter(others).map(|index| {
+        let collision = &log.collisions[index];
+        let harm = oracle::severity(collision).harm.name();
+        format!("collision with {} ({harm} harm)", collision.body.like.name())
+    });
+    let kept = match found {
+        Found::Breach(index) => Some(log.breaches[index].requirement),
+        Found::Collision(_) => None,
+    };
+    let breaches = log.first_breaches().filter(|breach| Some(breach.requirement) != kept);
+    let breaches = breaches.map(|breach| format!("breach of `{}`", space.requirements[breach.requirement].name));
+    collisions.chain(breaches).collect()
+}
+
+/// What is there before and not after, each as often.
+fn gone([before, mut after]: [Vec<String>; 2]) -> Vec<String> {
+    let is_gone = |finding: &String| match after.iter().position(|other| other == finding) {
+        Some(at) => {
+            after.swap_remove(at);
+            false
+        }
+        None => true,
+    };
+    before.into_iter().filter(is_gone).collect()
 }
 
 /// The median of steps and of actions, each by itself.

@@ -393,9 +393,11 @@ def try_failure(work, number, file, seed):
     if pair and number % 3 == 0 and time.monotonic() < END:
         written = {way: shrunk_path(paths[way]).read_bytes() for way in pair}
         both = [paths[way] for way in pair]
-        _, stdout, stderr = avastra("shrink", "--jobs", 2, *both)
+        status, stdout, stderr = avastra("shrink", "--jobs", 2, *both)
         said = (stdout + stderr).splitlines()
-        for way in pair:
+        if status is None:
+            rows["not done in time"] += 1
+        for way in pair if status is not None else []:
             path = paths[way]
             rows["shrunk again with `--jobs 2`, and compared in words"] += 1
             if shrunk_path(path).read_bytes() != written[way]:

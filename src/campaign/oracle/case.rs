@@ -89,6 +89,19 @@ pub enum Regression {
 }
 
 impl Regression {
+    /// How bad it is for the driving system: of several crashes of a scenario the worst is its outcome.
+    pub fn rank(self) -> u32 {
+        match self {
+            Regression::Fixed { .. } => 0,
+            Regression::NeverMet => 1,
+            Regression::NotCounted { .. } => 2,
+            Regression::OtherCrash => 3,
+            Regression::AdsFailed(_) => 4,
+            Regression::FailsAgain(_) => 5,
+            Regression::StillFails { .. } => 6,
+        }
+    }
+
     /// Whether a crash remains that is not the one of the scenario: with another obstacle, or one that does not count.
     pub fn is_other_crash(self) -> bool {
         matches!(self, Regression::OtherCrash | Regression::NotCounted { .. })

@@ -213,7 +213,6 @@ struct Search<'a> {
     setup: &'a Setup,
     wanted: Wanted,
     /// What is shrunk, and how hard it is.
-    whole: Candidate,
     log: &'a EpisodeLog,
     found: Found,
     worth: Worth,
@@ -247,9 +246,9 @@ impl<'a> Search<'a> {
                 Wanted::Breach { requirement, is_kept: is_kept(setup, log, requirement) }
             }
         };
-        let (whole, worth) = (Candidate::of(setup, log, found), Worth::new(log, found, None));
+        let worth = Worth::new(log, found, None);
         let best = worth.clone();
-        Search { setup, wanted, whole, log, found, worth, best, replays, recurrence: None, plays: 0 }
+        Search { setup, wanted, log, found, worth, best, replays, recurrence: None, plays: 0 }
     }
 
     /// How often what is shrunk recurs.
@@ -257,8 +256,9 @@ impl<'a> Search<'a> {
         if let Some(known) = self.recurrence {
             return known;
         }
-        let Search { setup, ref whole, log, found, replays, .. } = *self;
-        let recurrence = Replayed::new(setup, &whole.script, log, replays).recurrence(found, replays);
+        let Search { setup, log, found, replays, .. } = *self;
+        // With all steps of the file, as its claim was made: another finding may come later.
+        let recurrence = Replayed::new(setup, &Script::of_log(log), log, replays).recurrence(found, replays);
         self.plays += replays;
         self.recurrence = Some(recurrence);
         recurrence

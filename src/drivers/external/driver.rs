@@ -54,6 +54,8 @@ pub struct External {
 struct Exchange {
     key: Key,
     question: Arc<str>,
+    /// Number and time, µs, of the step that it asks; `None` of a reset.
+    step: Option<(u64, u64)>,
     outcome: Outcome,
 }
 
@@ -135,7 +137,7 @@ impl External {
             self.failure = Some(Arc::clone(failure));
             self.live = Live::default();
         }
-        self.exchanges.push(Exchange { key, question, outcome: outcome.clone() });
+        self.exchanges.push(Exchange { key, question, step, outcome: outcome.clone() });
         self.failure.is_none().then_some(outcome)
     }
 
@@ -166,17 +168,15 @@ impl External {
             session.ready(&self.map.line, "map", self.program.settings().timeouts.map_s)?;
             session.map = Some(self.map.key.0);
         }
-        for (index, exchange) in self.exchanges.iter().enumerate() {
-            // The time of the step is of no use here: what is checked with it was checked before.
-            let step = index.checked_sub(1).map(|seq| (seq as u64, 0));
+        for exchange in &self.exchanges {
             if matches!(exchange.outcome, Outcome::Missed) {
                 session.pass(&exchange.question);
                 continue;
             }
-            let again = self.answer(&mut session, &exchange.question, step)?;
+            let again = self.answer(&mut session, &exchange.question, exchange.step)?;
             // What says that it may answer otherwise is not at fault when it does.
             if self.program.is_deterministic() && !again.means(&exchange.outcome) {
-                let stage = step.map_or("reset".to_owned(), |(seq, _)| format!("step {seq}"));
+                let stage = exchange.step.map_or("reset".to_owned(), |(seq, _)| format!("step {seq}"));
                 let text = |outcome: &Outcome| serde_json::to_string(&outcome.essence()).unwrap_or_default();
                 let detail = format!(
                     "shown the same again after a reset, it answered {} instead of {}",

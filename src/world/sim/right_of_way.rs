@@ -85,6 +85,8 @@ const HOLDS_S: f64 = 2.0;
 /// A vehicle that moves faster than this to its side comes into another lane, m/s. Ours: less than any lane
 /// change, more than any wandering.
 pub(super) const SIDEWAYS_MPS: f64 = 0.15;
+/// An ego vehicle that is faster than the limit by more than this speeds, m/s: as `keeps_the_limit` of the law has it.
+const SPEEDING_MPS: f64 = 1.0;
 /// A pedestrian within this distance of the strip that the ego vehicle drives on is in its way, m. Ours.
 const BESIDE_M: f64 = 0.5;
 /// Farther to the side of that strip a pedestrian is on another road, m: six lanes.
@@ -199,7 +201,7 @@ impl Rights {
     pub fn watch_wreck(&mut self, this: &Obstacle, around: &Around) {
         if self.wreck.is_none() && this.distance_m <= APPROACH_M {
             self.wreck = room_before_m(this, around).map(|room_m| {
-                let has_time = can_stop(around.ego.speed_mps, room_m, ABRUPT_MPS2);
+                let has_time = can_stop(allowed_mps(around.ego.speed_mps, around), room_m, ABRUPT_MPS2);
                 (if has_time { Priority::Other } else { Priority::None }, around.time_s())
             });
         }
@@ -296,7 +298,7 @@ impl Rights {
             self.foreseen = self.foreseen.filter(is_there);
         } else if self.foreseen.is_none()
             && in_sight
-            && can_stop(around.ego.speed_mps, this.distance_m, ABRUPT_MPS2)
+            && can_stop(allowed_mps(around.ego.speed_mps, around), this.distance_m, ABRUPT_MPS2)
         {
             self.foreseen = Some(Foreseen { at, blocks: room_before_m(this, around).is_some() });
         }
@@ -379,6 +381,14 @@ impl Rights {
         }
         self.shares = Some(shares);
     }
+}
+
+/// The speed from which the ego vehicle's way to stop is reckoned, m/s: its own, or what is allowed. Others need not leave more time
+/// to who speeds.
+fn allowed_mps(own_mps: f64, around: &Around) -> f64 {
+    let lane = around.scene.route.lane_at(around.ego_station_m).lane;
+    let limit_mps = around.scene.map.lane(lane).speed_limit_mps;
+    if own_mps > limit_mps + SPEEDING_MPS { limit_mps } else { own_mps }
 }
 
 /// Whether a vehicle that begins to brake after [`REACTION_S`] is at rest within a distance.

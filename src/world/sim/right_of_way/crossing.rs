@@ -7,7 +7,7 @@ use avastra_road::LaneIndex;
 
 use super::passed::{Passed, by_stops};
 use super::side::Side;
-use super::{ABRUPT_MPS2, APPROACH_M, Mover, Rule, Ruling, by_lights, by_order, can_stop, room_before_m};
+use super::{ABRUPT_MPS2, APPROACH_M, Mover, Rule, Ruling, allowed_mps, by_lights, by_order, can_stop, room_before_m};
 use crate::scene::junction::{Area, RouteArea};
 use crate::sim::around::Around;
 use crate::sim::ego::VehicleParameters;
@@ -197,6 +197,7 @@ impl Crossing {
             (ego_first, _) => (ego_first, true),
         };
         let ruling = |priority, rule, mover| Ruling { priority, rule, mover, time_s: around.time_s() };
+        let ego = Passage { speed_mps: allowed_mps(self.ego.speed_mps, around), ..self.ego };
         // The first has left the second, which goes before it, room to brake gently: it has given way. An ego vehicle that
         // passed its light or its sign has not, however early it came; of another one that did, both are to blame.
         let is_violation = matches!(rule, Rule::Light | Rule::BothLights | Rule::StopSign);
@@ -206,7 +207,7 @@ impl Crossing {
             {
                 ruling(Priority::Ego, Rule::Clearing, Mover::Ego)
             }
-            Priority::Ego if is_open && !ego_first && self.ego.has_time_for(&self.other) => {
+            Priority::Ego if is_open && !ego_first && ego.has_time_for(&self.other) => {
                 let priority = if is_violation { Priority::None } else { Priority::Other };
                 ruling(priority, Rule::Clearing, Mover::Other)
             }

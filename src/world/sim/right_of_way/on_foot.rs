@@ -3,7 +3,7 @@
 use avastra_base::kinematics::CAREFUL_BRAKING_MPS2;
 use avastra_lang::model::vocabulary::{Body, Priority};
 
-use super::{APPROACH_M, Mover, Rule, Ruling, can_stop};
+use super::{APPROACH_M, Mover, Rule, Ruling, allowed_mps, can_stop};
 use crate::sim::around::Around;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::road_user::Obstacle;
@@ -40,7 +40,7 @@ impl Strip {
 
     /// Whether the ego vehicle can stop before the pedestrian.
     pub fn leaves_room(&self, around: &Around) -> bool {
-        can_stop(around.ego.speed_mps, self.ahead_m, CAREFUL_BRAKING_MPS2)
+        can_stop(allowed_mps(around.ego.speed_mps, around), self.ahead_m, CAREFUL_BRAKING_MPS2)
     }
 }
 

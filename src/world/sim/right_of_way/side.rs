@@ -8,7 +8,7 @@ use avastra_lang::model::vocabulary::Priority;
 use avastra_road::RoadMap;
 
 use super::crossing::{Course, Vehicle};
-use super::{ABRUPT_MPS2, Mover, Rule, Ruling, SIDEWAYS_MPS, can_stop};
+use super::{ABRUPT_MPS2, Mover, Rule, Ruling, SIDEWAYS_MPS, allowed_mps, can_stop};
 use crate::sim::around::Around;
 use crate::sim::road_user::Obstacle;
 
@@ -23,6 +23,10 @@ const ASIDE_M: f64 = 6.0;
 const TURNS_RAD: f64 = FRAC_PI_6;
 /// A body that reaches over the border of its lane by more than this leaves it, m. Ours: drivers keep lanes no better.
 const OVER_M: f64 = 0.1;
+/// Who moves to the side so fast, m/s, and would be over a line this much later, s, leaves its lane: in bends and between lines
+/// nobody who keeps a lane does. Ours.
+const CROSSING_MPS: f64 = 0.5;
+const SOON_S: f64 = 1.0;
 
 /// How the ego vehicle and another lie beside the other's way.
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +40,8 @@ pub(super) struct Side {
     pub along: f64,
     /// Speeds along the way, m/s.
     pub ego_mps: f64,
+    /// That of the ego vehicle, if it kept to the limit.
+    pub allowed_mps: f64,
     pub other_mps: f64,
     /// What each does that the other need not expect.
     pub ego_does: Option<Rule>,
@@ -88,12 +94,14 @@ impl Side {
             towards_mps: other_towards_mps,
             is_changing_lanes: vehicle.is_changing_lanes,
         };
+        let ego_mps = ego.forward.dot(&around.ego_velocity_mps);
         Some(Side {
             aside_m: across_m.abs() - ego_width_m - other_width_m,
             apart_m,
             ego_is_ahead: ego.station_m > other.station_m,
             along: around.ego_forward.dot(&this.forward),
-            ego_mps: ego.forward.dot(&around.ego_velocity_mps),
+            ego_mps,
+            allowed_mps: allowed_mps(ego_mps, around),
             other_mps: other.forward.dot(&this.velocity_mps),
             ego_does: ego_does.rule(map),
             other_does: other_does.rule(map),
@@ -107,8 +115,10 @@ impl Side {
 
     /// Whether the vehicle behind keeps its distance to the one ahead if it brakes gently, or not at all.
     pub fn is_gentle(&self) -> bool {
-        let (behind_mps, ahead_mps) =
-            if self.ego_is_ahead { (self.other_mps, self.ego_mps) } else { (self.ego_mps, self.other_mps) };
+        let (behind_mps, ahead_mps) = match self.ego_is_ahead {
+            true => (self.other_mps, self.ego_mps),
+            false => (self.allowed_mps, self.other_mps),
+        };
         let ahead_mps = ahead_mps.max(0.0);
         let room_m = self.apart_m - ahead_mps * HEADWAY_S;
         self.along > 0.0
@@ -213,8 +223,11 @@ impl Conduct<'_> {
         }
         let half_m = self.outline.half_extent_m(self.forward, along).1;
         let over_m = place.offset_m.abs() + half_m - lane.width_at(place.station_m) / 2.0;
-        let moves_over = self.towards_mps > SIDEWAYS_MPS && over_m > OVER_M;
-        (moves_over || self.is_changing_lanes && self.towards_mps > 0.0).then_some(Rule::LeavingLane)
+        // By its motion, not by the word that sent it there: it is over the line, or soon will be.
+        let aside_mps = along.perp(&self.velocity_mps).abs();
+        let soon_m = if aside_mps > CROSSING_MPS { aside_mps * SOON_S } else { 0.0 };
+        let moves_over = self.towards_mps > SIDEWAYS_MPS && over_m + soon_m > OVER_M;
+        moves_over.then_some(Rule::LeavingLane)
     }
 }
 

@@ -163,6 +163,7 @@ fn one_who_cuts_in_and_stops_has_not_given_way_before_the_distance_is_back() {
         ego_is_ahead: false,
         along: 1.0,
         ego_mps: 10.0,
+        allowed_mps: 10.0,
         other_mps,
         ego_does: None,
         other_does: Some(Rule::LeavingLane),
@@ -176,6 +177,20 @@ fn one_who_cuts_in_and_stops_has_not_given_way_before_the_distance_is_back() {
     assert!(side(22.0, 0.0).is_gentle());
 }
 
+#[test]
+fn others_need_not_leave_more_room_to_who_speeds() {
+    let side = |allowed_mps: f64| Side { aside_m: -1.0, apart_m: 30.0, ego_mps: 20.0, allowed_mps, other_mps: 6.0, ..SIDE };
+    assert!(!side(20.0).is_gentle() && side(13.9).is_gentle());
+    // What counts is the speed of whoever is behind.
+    assert!(Side { ego_is_ahead: true, other_mps: 20.0, ..side(13.9) }.is_gentle());
+    let scene = testing::straight();
+    let world = testing::world(&scene);
+    let limit_mps = scene.map.lane(scene.route.lane_at(0.0).lane).speed_limit_mps;
+    let allowed = |own_mps: f64| allowed_mps(own_mps, &world.alone());
+    assert_eq!([5.0, limit_mps + 1.0].map(allowed), [5.0, limit_mps + 1.0]);
+    assert_eq!(allowed(limit_mps + 1.1), limit_mps);
+}
+
 /// Two in one direction, the ego vehicle 2 m behind, flank to flank by half a metre and at the same speed; neither leaves its lane.
 const SIDE: Side = Side {
     aside_m: -0.5,
@@ -183,6 +198,7 @@ const SIDE: Side = Side {
     ego_is_ahead: false,
     along: 1.0,
     ego_mps: 10.0,
+    allowed_mps: 10.0,
     other_mps: 10.0,
     ego_does: None,
     other_does: None,
