@@ -402,6 +402,21 @@ fn trained_elsewhere(policy: &Policy, run: &Run) -> Option<String> {
         let (before, after) = (origin.traffic.clone().unwrap_or_else(usual), traffic.unwrap_or_else(usual));
         told.push(format!("with traffic {before}, and plays with {after}"));
     }
+    if settings.ambient > 0 {
+        let vehicles = plural(settings.ambient as usize, "vehicle");
+        told.push(format!("without ambient traffic, and plays among {vehicles} of it"));
+    }
+    for (how, before, now) in
+        [("with", &origin.with, &settings.with), ("without", &origin.without, &settings.without)]
+    {
+        if before != now {
+            let rules = |names: &[String]| match names {
+                [] => format!("{how} no rule"),
+                names => format!("{how} `{}`", names.join("`, `")),
+            };
+            told.push(format!("{}, and plays {}", rules(before), rules(now)));
+        }
+    }
     (!told.is_empty()).then(|| {
         format!("`{}` was trained {}: what it learned need not hold there", policy.name, told.join("; "))
     })

@@ -304,7 +304,10 @@ fn threads_and_processes_change_nothing_and_crashes_replay_with_and_without_the_
     assert!(status == 5 && stdout.contains("it failed at step"), "{status}: {stdout}{stderr}");
     // It is made small with the program; what only the program can show is not tried without it.
     let small = scratch.path().join("small.ava").display().to_string();
-    done(&["shrink", &path, "--ads", &config, "--out", &small]);
+    let told = last_line(&done(&["shrink", &path, "--ads", &config, "--out", &small, "--format", "json"]));
+    let told = &told["scenarios"][0];
+    // Each try leaves the known answers somewhere in the middle, and shows a process what came before.
+    assert!(told["actions"].as_u64() < told["actions_before"].as_u64(), "{told}");
     let claims_minimal = std::fs::read_to_string(&small).unwrap().contains("expect minimal");
     for (more, is_tried) in [(&[][..], false), (&["--ads", &config], true)] {
         let stdout = done(&[&["replay", &small][..], more].concat());

@@ -68,7 +68,7 @@ fn in_full(one: &Value) -> String {
     let scenario = text.lines().skip_while(|line| !line.starts_with("  road: "));
     let scenario = scenario.filter(|line| !line.contains("sha256:"));
     format!(
-        "{}: {} of {} actions, {} of {} steps, {} plays\n  before {}\n  after  {}\n{}\n",
+        "{}: {} of {} actions, {} of {} steps, {} plays\n  before {}\n  after  {}\n  gone   {}\n{}\n",
         one["scenario"],
         one["actions"],
         one["actions_before"],
@@ -77,6 +77,7 @@ fn in_full(one: &Value) -> String {
         one["plays"],
         one["worth_before"],
         one["worth"],
+        one["gone"],
         scenario.collect::<Vec<_>>().join("\n")
     )
 }

@@ -102,6 +102,42 @@ fn a_suite_outlives_changes_of_its_space() {
     assert_eq!(unchanged as u64, kept);
 }
 
+/// Of several crashes that a file claims each is asked by itself: a driver that avoids the first may make the second.
+#[test]
+fn a_scenario_of_two_crashes_is_mended_when_both_are_gone() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let path = |name: &str| scratch.path().join(name).display().to_string();
+    let space = root().join("tests/cases/spaces/two_crashes.ava").display().to_string();
+    done(&["run", &space, "--ads", "blind", "--episodes", "1", "--replays", "0", "--out", &path("run")]);
+    let slow = "{perception: {detection_chance_max: 0, plenty_m: 0, ghosts_per_s: 0}, \
+                planning: {cruise_mps: 9, sight_bounds_speed: false}}";
+    std::fs::write(path("slow.yaml"), slow).expect("it is writable");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["test", &path("run"), "--ads", &path("slow.yaml")]));
+    assert!(status == 4 && stdout.contains("the same obstacle is hit at 22.00 s"), "{status}: {stdout}{stderr}");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["test", &path("run"), "--ads", "idm"]));
+    assert!(status == 0 && stdout.contains("1 passed"), "{status}: {stdout}{stderr}");
+}
+
+/// What a suite takes over keeps the rights of its file, and a link in a run's folder is not written through.
+#[test]
+fn accepted_scenarios_keep_their_rights() {
+    use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
+    let found = Found::new(&[]);
+    let files = found.files("run/critical");
+    let rights = |path: &PathBuf| std::fs::metadata(path).expect("it is there").mode() & 0o777;
+    std::fs::set_permissions(&files[0], PermissionsExt::from_mode(0o600)).expect("it is ours");
+    let mine = found.scratch.path().join("mine.ava");
+    std::fs::copy(&files[1], &mine).expect("there is room");
+    std::fs::remove_file(&files[1]).expect("it is ours");
+    symlink(&mine, &files[1]).expect("a link can be made");
+    let before = std::fs::read(&mine).expect("it is readable");
+    found.edit("space/avastra45.ava", "let weight_mode = 1.0", "let weight_mode = 1.0\nodds Side { Left => 3 }");
+    let (_, tested, stderr) = found.test(&["--accept", &found.path("run")]);
+    assert_eq!(tested["accepted"].as_u64(), Some(found.scenarios as u64 - 1), "{stderr}{tested}");
+    assert_eq!(rights(&files[0]), 0o600);
+    assert!(files[1].is_symlink() && std::fs::read(&mine).expect("it is readable") == before);
+}
+
 /// A scenario is shown whatever happens to its space: as it was recorded if the run's copy of the space is there, otherwise as
 /// it plays now. The banner says which.
 #[test]

@@ -4,7 +4,8 @@
 //! same time with the same values, if it is legal there, too. Most requirements are about the drive up to then rather
 //! than about a last moment, so the question begins at the start, and not at a hazard as that of a collision does. Who
 //! comes to the same place a little later must keep it there, too: the question ends one step after that of the breach. Up
-//! to then the careful driver must not have breached the requirement, nor touched anybody.
+//! to then the careful driver must not have breached the requirement. One that touches somebody before the moment of the breach
+//! has not come to it, and is left out.
 
 use std::cmp::Ordering;
 
@@ -49,8 +50,8 @@ pub fn breached(setup: &Setup, script: &Script, log: &EpisodeLog) -> Vec<Breache
                 .breaches
                 .iter()
                 .any(|breach| breach.requirement == first.requirement && breach.step <= first.step + 1);
-            let crashes = again.collisions.iter().any(|crash| crash.step <= first.step + 1);
-            if !breaks && !crashes {
+            let crashed = again.collisions.iter().any(|crash| crash.contact.time_s < first.time_s);
+            if !breaks && !crashed {
                 breached.kept_by.push(name.to_owned());
             }
         }

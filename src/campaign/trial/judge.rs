@@ -193,7 +193,7 @@ pub(super) fn verdict(
             if request.speed_mps == 0.0 {
                 return moves(request, seen);
             }
-            let crossing = crosses(seen)?;
+            let crossing = crosses(request, seen)?;
             let until = Sighting { frames: seen.frames[..=crossing].to_vec(), ..*seen };
             changes(&scene.map, request, &until, [asked, asked], 0)
         }
@@ -304,7 +304,7 @@ fn has_turned(scene: &Scene, seen: &Sighting) -> Result<(), String> {
 }
 
 /// The frame in which it is on the route's path.
-fn crosses(seen: &Sighting) -> Result<usize, String> {
+fn crosses(request: &SpawnRequest, seen: &Sighting) -> Result<usize, String> {
     let on_path = |frame: &Frame| {
         let turn_rad = turned_rad(frame);
         let reach_m = frame.outline.half_length_m * libm::sin(turn_rad).abs()
@@ -320,7 +320,9 @@ fn crosses(seen: &Sighting) -> Result<usize, String> {
         return Err(ended(seen, "it had come onto the route"));
     };
     let frame = &seen.frames[index];
-    if frame.route_station_m < VehicleParameters::MKZ.rear_m(frame.ego_station_m) {
+    // Unless it is to come after the ego vehicle.
+    let comes_after = request.early_s.is_some_and(|early_s| early_s < 0.0);
+    if !comes_after && frame.route_station_m < VehicleParameters::MKZ.rear_m(frame.ego_station_m) {
         return Err("it came when the ego vehicle had passed".to_owned());
     }
     Ok(index)

@@ -549,26 +549,26 @@ impl Checker {
     }
 
     fn call(&mut self, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
-        if call.name.text == SINCE.0 && self.function_names.get(SINCE.0).is_none() {
-            return self.since(call, place);
-        }
-        if let Some(word) = PastWord::from_name(&call.name.text)
-            && self.function_names.get(&call.name.text).is_none()
-        {
-            return self.past(word, call, place);
-        }
-        if let Some(word) = NumberWord::from_name(&call.name.text)
-            && self.function_names.get(&call.name.text).is_none()
-        {
-            return self.of_numbers(word, call, place);
-        }
-        if call.name.text == BEGINS.0 && self.function_names.get(BEGINS.0).is_none() {
-            return self.begins(call, place);
-        }
-        if let Some(word) = NearWord::from_name(&call.name.text)
-            && self.function_names.get(&call.name.text).is_none()
-        {
-            return self.near(word, call, place);
+        let name = call.name.text.as_str();
+        let built_in = (PastWord::from_name(name), NumberWord::from_name(name), NearWord::from_name(name));
+        let is_built_in = built_in != (None, None, None) || [SINCE.0, BEGINS.0].contains(&name);
+        match self.function_names.place(name) {
+            // A file that uses this one must not change what it says.
+            Some(declared) if is_built_in && declared.file != call.name.span.file => {
+                let message = format!("`{name}` is built in, and another file declares a function of that name");
+                let error = Diagnostic::error(code::DUPLICATE, message).at(declared, "declared here");
+                let error = error.beside(call.name.span, "the built-in one is meant here");
+                return self.reject(error.help("give the function another name"));
+            }
+            Some(_) => {}
+            None => match built_in {
+                (Some(word), ..) => return self.past(word, call, place),
+                (_, Some(word), _) => return self.of_numbers(word, call, place),
+                (.., Some(word)) => return self.near(word, call, place),
+                _ if name == SINCE.0 => return self.since(call, place),
+                _ if name == BEGINS.0 => return self.begins(call, place),
+                _ => {}
+            },
         }
         let symbol = Symbol::Function(call.name.text.clone());
         let named = call.args.iter().filter_map(|argument| argument.name.as_ref());

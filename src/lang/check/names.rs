@@ -39,6 +39,11 @@ impl Names {
         self.found.get(name).map(|(index, _)| *index)
     }
 
+    /// Where a name is declared.
+    pub fn place(&self, name: &str) -> Option<Span> {
+        self.found.get(name).map(|(_, place)| *place)
+    }
+
     /// The name with that index.
     pub fn name(&self, index: usize) -> Option<&str> {
         self.by_index.get(index).map(String::as_str)

@@ -49,7 +49,12 @@ pub(super) fn on_foot(asked: &Asked) -> Result<Newcomers, String> {
     let asked_m = ahead_m(asked)?;
     if request.verb == Verb::Stand {
         let lane = around.scene.route.path.pose_at(asked_m).offset(0.0, request.offset_m);
-        let turn_rad = if request.side == Side::Left { -FRAC_PI_2 } else { FRAC_PI_2 };
+        // Who is on foot looks across the road; a thing lies along it.
+        let turn_rad = match request.side {
+            _ if request.body == Body::Object => 0.0,
+            Side::Left => -FRAC_PI_2,
+            Side::Right => FRAC_PI_2,
+        };
         let pose = Pose { heading_rad: wrap_angle(lane.heading_rad + turn_rad), ..lane };
         return Ok(Newcomers { asked: finish(asked, Motion::Stand, at(pose))?, cover: None });
     }

@@ -108,9 +108,9 @@ impl Side {
         })
     }
 
-    /// Whether the two come towards each other.
+    /// Whether the two come towards each other. One that backs up does not, which way ever it looks.
     fn is_oncoming(&self) -> bool {
-        self.along < -0.5
+        self.along < -0.5 && ![self.ego_does, self.other_does].contains(&Some(Rule::Backing))
     }
 
     /// Whether the vehicle behind keeps its distance to the one ahead if it brakes gently, or not at all.
