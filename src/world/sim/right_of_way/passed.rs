@@ -278,6 +278,23 @@ mod tests {
     }
 
     #[test]
+    fn a_vehicle_that_keeps_to_no_lanes_passes_stop_signs_and_no_others() {
+        let passes = |sign: &str| {
+            let scene = testing::crossing_of(sign, "274");
+            let mut world = testing::world(&scene);
+            world.put("1", -1, "2", 275.0, 5.0);
+            let this = world.latest().obstacle.clone();
+            let pose = this.outline.pose.offset(20.0, 0.0);
+            let (forward, velocity_mps) = (this.forward, this.velocity_mps);
+            let moved = Moved { pose, forward, lane_heading_rad: pose.heading_rad, velocity_mps };
+            let mut passed = Passed::default();
+            passed.pass_freely(&this, &moved, &world.alone());
+            passed.sign.is_some()
+        };
+        assert_eq!(["206", "205", "274"].map(passes), [true, false, false]);
+    }
+
+    #[test]
     fn a_stop_sign_is_being_run_from_its_lane_to_the_end_of_the_junction() {
         let map = testing::crossing_of("206", "274").map.clone();
         let lane = map.place("1", -1, 280.0).expect("it is there").lane;
