@@ -256,7 +256,9 @@ pub fn write_named(path: &Path, bytes: &[u8]) -> Result<()> {
 pub fn write_anew(path: &Path, bytes: &[u8]) -> Result<()> {
     match std::fs::symlink_metadata(path) {
         Ok(found) if found.is_file() && found.nlink() == 1 => write_over(path, &found, bytes),
-        Ok(_) => Err(Error::other("it is a link, or has further names: name the file itself to have it written")),
+        Ok(_) => {
+            Err(Error::other("it is a link, or has further names: name the file itself to have it written"))
+        }
         Err(_) => write(path, bytes),
     }
 }

@@ -287,7 +287,8 @@ fn other_findings(space: &Space, log: &EpisodeLog, judgements: &[Judgement], fou
         Found::Collision(_) => None,
     };
     let breaches = log.first_breaches().filter(|breach| Some(breach.requirement) != kept);
-    let breaches = breaches.map(|breach| format!("breach of `{}`", space.requirements[breach.requirement].name));
+    let breaches =
+        breaches.map(|breach| format!("breach of `{}`", space.requirements[breach.requirement].name));
     collisions.chain(breaches).collect()
 }
 

@@ -185,12 +185,15 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
 
 /// Plays again what did not fail in its one play, because the driving system was taken for deterministic.
 fn play_loosely(output: &Output, suite: &Suite, cases: &mut [Case]) -> Result<(), Failure> {
-    let is_open =
-        |case: &&Case| case.by.loose_plays.is_none() && !case.outcome.is_failure() && case.outcome.was_played();
+    let is_open = |case: &&Case| {
+        case.by.loose_plays.is_none() && !case.outcome.is_failure() && case.outcome.was_played()
+    };
     let files: Vec<PathBuf> = cases.iter().filter(is_open).map(|case| case.file.clone()).collect();
     if !files.is_empty() {
         let scenarios = plural(files.len(), "scenario");
-        output.warn(&format!("the driving system is not deterministic, though it says so: {scenarios} played again"));
+        output.warn(&format!(
+            "the driving system is not deterministic, though it says so: {scenarios} played again"
+        ));
         let many = FilesArguments { files, jobs: suite.arguments.jobs };
         let mut tell = |found: &Option<(Case, Notes)>| found.iter().for_each(|found| tell(output, found));
         let program = suite.asked.external.as_ref();

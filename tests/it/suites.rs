@@ -112,8 +112,12 @@ fn a_scenario_of_two_crashes_is_mended_when_both_are_gone() {
     let slow = "{perception: {detection_chance_max: 0, plenty_m: 0, ghosts_per_s: 0}, \
                 planning: {cruise_mps: 9, sight_bounds_speed: false}}";
     std::fs::write(path("slow.yaml"), slow).expect("it is writable");
-    let (status, stdout, stderr) = outcome(&mut avastra(&["test", &path("run"), "--ads", &path("slow.yaml")]));
-    assert!(status == 4 && stdout.contains("the same obstacle is hit at 22.00 s"), "{status}: {stdout}{stderr}");
+    let (status, stdout, stderr) =
+        outcome(&mut avastra(&["test", &path("run"), "--ads", &path("slow.yaml")]));
+    assert!(
+        status == 4 && stdout.contains("the same obstacle is hit at 22.00 s"),
+        "{status}: {stdout}{stderr}"
+    );
     let (status, stdout, stderr) = outcome(&mut avastra(&["test", &path("run"), "--ads", "idm"]));
     assert!(status == 0 && stdout.contains("1 passed"), "{status}: {stdout}{stderr}");
 }
@@ -131,7 +135,11 @@ fn accepted_scenarios_keep_their_rights() {
     std::fs::remove_file(&files[1]).expect("it is ours");
     symlink(&mine, &files[1]).expect("a link can be made");
     let before = std::fs::read(&mine).expect("it is readable");
-    found.edit("space/avastra45.ava", "let weight_mode = 1.0", "let weight_mode = 1.0\nodds Side { Left => 3 }");
+    found.edit(
+        "space/avastra45.ava",
+        "let weight_mode = 1.0",
+        "let weight_mode = 1.0\nodds Side { Left => 3 }",
+    );
     let (_, tested, stderr) = found.test(&["--accept", &found.path("run")]);
     assert_eq!(tested["accepted"].as_u64(), Some(found.scenarios as u64 - 1), "{stderr}{tested}");
     assert_eq!(rights(&files[0]), 0o600);

@@ -555,7 +555,8 @@ impl Checker {
         match self.function_names.place(name) {
             // A file that uses this one must not change what it says.
             Some(declared) if is_built_in && declared.file != call.name.span.file => {
-                let message = format!("`{name}` is built in, and another file declares a function of that name");
+                let message =
+                    format!("`{name}` is built in, and another file declares a function of that name");
                 let error = Diagnostic::error(code::DUPLICATE, message).at(declared, "declared here");
                 let error = error.beside(call.name.span, "the built-in one is meant here");
                 return self.reject(error.help("give the function another name"));

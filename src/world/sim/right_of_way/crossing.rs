@@ -7,7 +7,9 @@ use avastra_road::LaneIndex;
 
 use super::passed::{Passed, by_stops};
 use super::side::Side;
-use super::{ABRUPT_MPS2, APPROACH_M, Mover, Rule, Ruling, allowed_mps, by_lights, by_order, can_stop, room_before_m};
+use super::{
+    ABRUPT_MPS2, APPROACH_M, Mover, Rule, Ruling, allowed_mps, by_lights, by_order, can_stop, room_before_m,
+};
 use crate::scene::junction::{Area, RouteArea};
 use crate::sim::around::Around;
 use crate::sim::ego::VehicleParameters;
@@ -282,6 +284,37 @@ mod tests {
     fn inside_is_from_the_front_in_to_the_rear_out() {
         assert!(passage(0.0, 0.1, 5.0).is_inside() && passage(-9.0, 1.0, 5.0).is_inside());
         assert!(!passage(0.1, 9.0, 5.0).is_inside() && !passage(-9.0, 0.0, 5.0).is_inside());
+    }
+
+    #[test]
+    fn the_later_of_the_two_says_how_soon_they_meet() {
+        let away_m = |ego_m: f64, other_m: f64| {
+            let (ego, other) = (passage(ego_m, 90.0, 5.0), passage(other_m, 90.0, 5.0));
+            Crossing { ego, other }.away_m()
+        };
+        assert_eq!((away_m(-2.0, 7.0), away_m(12.0, 7.0)), (7.0, 12.0));
+    }
+
+    #[test]
+    fn a_path_along_a_lane_goes_through_its_area_as_the_lane_does() {
+        let scene = testing::crossing();
+        let area = &scene.route_areas[0].area;
+        let lane = &scene.map.lane(area.other).centre;
+        let mut world = testing::world(&scene);
+        world.put("4", -1, "5", 250.0, 5.0);
+        let this = &world.latest().obstacle;
+        let through = |path: &Path, station_m: f64| {
+            let way = Course::Path(path, station_m);
+            let vehicle = Vehicle { this, speed_mps: 5.0, is_changing_lanes: false, has_siren: false, way };
+            vehicle.through(area, &world.alone())
+        };
+        let half_m = this.outline.half_length_m;
+        let (in_m, out_m) = through(lane, 1.0).expect("it leads through the area");
+        assert!((in_m - (area.other_from_m - 1.0 - half_m)).abs() < 1e-6, "{in_m}");
+        assert!((out_m - (area.other_to_m - 1.0 + half_m)).abs() < 1e-6, "{out_m}");
+        // The ego vehicle's own lane crosses it.
+        let across = &scene.map.lane(scene.route_areas[0].lane).centre;
+        assert_eq!(through(across, 1.0), None);
     }
 
     #[test]

@@ -220,6 +220,7 @@ mod tests {
     use super::*;
     use crate::sim::testing;
     use crate::sim::{Start, World};
+    use avastra_lang::model::vocabulary::Body;
 
     #[test]
     fn at_stop_signs_the_first_to_stand_goes_first_and_who_did_not_stand_gives_way() {
@@ -279,11 +280,11 @@ mod tests {
 
     #[test]
     fn a_vehicle_that_keeps_to_no_lanes_passes_stop_signs_and_no_others() {
-        let passes = |sign: &str| {
+        let passes = |sign: &str, body: Body| {
             let scene = testing::crossing_of(sign, "274");
             let mut world = testing::world(&scene);
             world.put("1", -1, "2", 275.0, 5.0);
-            let this = world.latest().obstacle.clone();
+            let this = Obstacle { body, ..world.latest().obstacle.clone() };
             let pose = this.outline.pose.offset(20.0, 0.0);
             let (forward, velocity_mps) = (this.forward, this.velocity_mps);
             let moved = Moved { pose, forward, lane_heading_rad: pose.heading_rad, velocity_mps };
@@ -291,7 +292,8 @@ mod tests {
             passed.pass_freely(&this, &moved, &world.alone());
             passed.sign.is_some()
         };
-        assert_eq!(["206", "205", "274"].map(passes), [true, false, false]);
+        assert_eq!(["206", "205", "274"].map(|sign| passes(sign, Body::Sedan)), [true, false, false]);
+        assert!(!passes("206", Body::Pedestrian), "no sign is for people on foot");
     }
 
     #[test]

@@ -108,6 +108,52 @@ fn a_vehicle_that_stands_in_the_junction_has_given_way_long_ago() {
 }
 
 #[test]
+fn an_ego_vehicle_blocks_who_crosses_while_it_is_on_its_strip() {
+    let scene = testing::crossing();
+    let area = &scene.route_areas[0].area;
+    let middle_m = (area.from_m + area.to_m) / 2.0;
+    // How far the middle of the ego vehicle is before the other's strip.
+    let blocks = |before_m: f64| {
+        let mut world = testing::world(&scene);
+        drive_to(&mut world, middle_m - before_m + VehicleParameters::MKZ.length_m / 2.0, 5.0);
+        world.put("4", -1, "5", 280.0, 0.0);
+        let user = world.latest();
+        let vehicle = Vehicle::of(&user.obstacle, &user.mover.motion).expect("it is a vehicle");
+        let found = Crossing::of(&vehicle, &world.alone()).expect("the ego vehicle is in the area");
+        found.is_blocked(Mover::Ego, &vehicle, &world.alone())
+    };
+    assert_eq!([3.8, 2.5, 0.0].map(blocks), [false, true, true]);
+}
+
+#[test]
+fn a_vehicle_that_waits_in_the_junction_and_sets_out_comes_anew() {
+    // It turns left before the ego vehicle, and waits in the junction beside the ego vehicle's strip.
+    let scene = testing::oncoming(Heading::Straight);
+    let passed = Passed::default();
+    let judged = |first_mps: f64| {
+        let mut world = begin(&scene, 0.0);
+        drive_to(&mut world, 40.0, 10.0);
+        world.put("3", 1, "8", 203.2, 0.0);
+        let mut rights = Rights::default();
+        let mut watch = |world: &World, speed_mps: f64| {
+            let user = world.latest();
+            let vehicle = Vehicle::of(&user.obstacle, &user.mover.motion).expect("it is a vehicle");
+            let vehicle = Vehicle { speed_mps, ..vehicle };
+            rights.watch_vehicle(&vehicle, &passed, &world.alone());
+            rights.meeting.expect("the two ways cross").ruling
+        };
+        let first = watch(&world, first_mps);
+        assert_eq!((first.priority, first.rule), (Priority::Other, Rule::Clearing));
+        drive_to(&mut world, 95.0, 10.0);
+        watch(&world, 4.0)
+    };
+    let of = |ruling: Ruling| (ruling.priority, ruling.rule, ruling.mover);
+    assert_eq!(of(judged(0.0)), (Priority::Ego, Rule::Turning, Mover::Other));
+    // One that has never stood still keeps what it has.
+    assert_eq!(of(judged(1.0)), (Priority::Other, Rule::Clearing, Mover::Other));
+}
+
+#[test]
 fn a_red_light_is_remembered_until_the_contact() {
     // 5 s into the cycle the ego vehicle's light is green, 15 s later the other's.
     let mut world = begin(&testing::crossing(), 5.0);
@@ -179,7 +225,14 @@ fn one_who_cuts_in_and_stops_has_not_given_way_before_the_distance_is_back() {
 
 #[test]
 fn others_need_not_leave_more_room_to_who_speeds() {
-    let side = |allowed_mps: f64| Side { aside_m: -1.0, apart_m: 30.0, ego_mps: 20.0, allowed_mps, other_mps: 6.0, ..SIDE };
+    let side = |allowed_mps: f64| Side {
+        aside_m: -1.0,
+        apart_m: 30.0,
+        ego_mps: 20.0,
+        allowed_mps,
+        other_mps: 6.0,
+        ..SIDE
+    };
     assert!(!side(20.0).is_gentle() && side(13.9).is_gentle());
     // What counts is the speed of whoever is behind.
     assert!(Side { ego_is_ahead: true, other_mps: 20.0, ..side(13.9) }.is_gentle());
