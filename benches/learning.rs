@@ -10,7 +10,7 @@ use std::hint::black_box;
 use std::sync::Arc;
 
 use avastra::agent::{Experience, Rows, Settings, Trajectory};
-use avastra::mdp::{Closeness, Observation, STATE_LEN};
+use avastra::mdp::{Observation, STATE_LEN};
 use avastra::rng::Stream;
 use avastra::{agent, rng};
 use ndarray::Array1;
@@ -88,8 +88,6 @@ fn episode(rng: &mut rng::Rng, steps: usize) -> Trajectory {
         last: observation(rng),
         last_legal: Array1::from_elem(ROWS, true),
         terminal: true,
-        closeness: Closeness::default(),
-        collisions: Vec::new(),
     }
 }
 

@@ -65,7 +65,7 @@ run scenarios/avastra45.ava --ads './my_planner --fast' # a driving system of yo
 run --resume runs/0001 # go on after Ctrl-C
 run scenarios/avastra45.ava --shard 3/8 --out shards/3 # an eighth of it, for `merge`
 train scenarios/avastra45.ava --road corner --episodes 750
-train scenarios/avastra45.ava --agent map-elites # a search in place of a learner
+train scenarios/avastra45.ava --agent bandit # a search in place of a learner
 train --resume runs/0001 # go on after Ctrl-C
 policy explain policies/corner.ava
 policy explain policies/corner.ava --state 'ego_speed: 12 m/s, time: Night'

@@ -180,7 +180,7 @@ estimate
   results.together.per_hour_interval object? `low` and `high`
   results.together.episodes number played from start to end
   results.together.driven_km number in these
-  results.together.simulated_h number in all, branches, trials and the pilot included
+  results.together.simulated_h number in all, trials and the pilot included
   results.together.gain number? simulated time that counting would need, over that needed
   results.together.effective_events number? as many events of one weight would say as much; of `probe` alone
   results.together.parts number samples

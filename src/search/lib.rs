@@ -17,7 +17,7 @@
 //! let mut agent = build();
 //! let legal = Array1::from_vec(vec![false, true, false]);
 //! let mut rng = rng::stream(1, Stream::Exploration, 0);
-//! agent.begin();
+//! agent.begin(7);
 //! assert_eq!(agent.choose(&Observation::zeros(), legal.view(), &mut rng), Some(1));
 //! ```
 

@@ -306,7 +306,7 @@ def uri(name, what):
         elif what == "study":
             status, said = home.run("study", "study.yaml", "--out", name)
         elif what == "train":
-            status, said = home.run("train", SPACE, "--road", "corner", "--agent", "av-fuzzer", "--ads", "cc", "--episodes", 1, "--out", name)
+            status, said = home.run("train", SPACE, "--road", "corner", "--agent", "bandit", "--ads", "cc", "--episodes", 1, "--out", name)
         elif what == "resume":
             out.parent.mkdir(parents=True, exist_ok=True)
             shutil.copytree(home.clone / "run", out)
@@ -610,7 +610,7 @@ def threads():
     commands = [["check", FOUND], ["fmt", "--check", "x.ava"], ["run", SPACE, "--road", "corner", "--ads", "cc", "--episodes", "2", "--out", "t"],
                 ["replay", FOUND], ["test", "run"], ["table", SPACE, "--try"], ["study", "study.yaml", "--out", "t"],
                 ["estimate", SPACE, "--road", "corner", "--ads", "cc", "--parts", "2", "--episodes", "1", "--out", "t"], ["diagnose", FOUND],
-                ["train", SPACE, "--road", "corner", "--agent", "av-fuzzer", "--ads", "cc", "--episodes", "1", "--out", "t"], ["report", FOUND], ["lsp"]]
+                ["train", SPACE, "--road", "corner", "--agent", "bandit", "--ads", "cc", "--episodes", "1", "--out", "t"], ["report", FOUND], ["lsp"]]
     for command in commands:
         for limits in ({"threads": 1}, {"threads": 0}, {"memory": 300 << 20}, {"memory": 200 << 20}):
             yield f"{limits} {command}", lambda command=command, limits=limits: short(command, limits)

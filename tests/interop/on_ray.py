@@ -32,7 +32,7 @@ agents:
     episodes: 60
     train_roads: [corner, crossroad]
     config: {{ hidden_units: [8], batch_len: 8, learning_starts: 20, updates_per_step: 1, observation_period_s: 4 }}
-  - {{ name: av-fuzzer, trainings: 4, episodes: 40 }}
+  - {{ name: bandit, trainings: 4, episodes: 40 }}
 baselines: [random]
 evaluation: {{ episodes: 5, seeds: 2, horizon_s: 60 }}
 """

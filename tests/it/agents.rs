@@ -4,10 +4,9 @@
 use std::sync::atomic::AtomicBool;
 
 use avastra::agent::{Entry, Kind, Settings};
-use avastra::episode::Choice;
 use avastra::run::{EpisodeSummary, Run, RunSettings};
 use avastra::train::{TrainSettings, TrainedEpisode, Training};
-use avastra::{agent, episode, run};
+use avastra::{agent, run};
 
 use crate::world::{assert_replays, run};
 
@@ -60,8 +59,6 @@ fn an_agent_that_acts_at_once_replays_and_does_not_depend_on_the_workers() {
         };
         let alone = judged(1);
         assert_eq!(alone, judged(2), "{}", entry.name);
-        let looks_ahead = alone.iter().all(|summary| summary.branched_s > 0.0);
-        assert_eq!(looks_ahead, entry.name == "greedy", "{}: {}", entry.name, alone[0].branched_s);
     }
 }
 
@@ -83,25 +80,5 @@ fn what_is_trained_goes_on_from_a_checkpoint_to_the_same_episodes() {
             assert!(one.simulated_s > 0.0 && one.simulated_s <= one.log.duration_s, "{name}");
         }
         assert_eq!(whole.agent().save(), resumed.agent().save(), "{}", entry.name);
-    }
-}
-
-#[test]
-fn a_branch_shows_what_then_comes_to_pass() {
-    let run = run(1, 7, &[]);
-    let setup = run.setup(0);
-    let mut ahead = Vec::new();
-    let log = episode::run(&setup, &mut |moment| {
-        let offers = run.table().offers(moment.situation);
-        let mut draws = offers.into_iter().filter_map(Result::ok);
-        let Some(draw) = draws.nth(moment.step % 3) else { return Choice::Pass };
-        // Other rows are tried in a branch as well; they leave no trace in the episode.
-        draws.take(2).for_each(|other| drop(moment.look_ahead(other)));
-        ahead.push(moment.look_ahead(draw.clone()));
-        Choice::Act(draw)
-    });
-    assert!(ahead.len() > 3);
-    for branch in ahead {
-        assert_eq!(branch.steps, log.steps[..branch.steps.len()]);
     }
 }

@@ -170,7 +170,7 @@ fn requests_that_cannot_be_met_are_refused() {
     let cases: [(&[&str], &str); 6] = [
         (&["estimate", SPACE, "--parts", "1"], "from 2 to"),
         (&["estimate", SPACE, "--method", "probe", "--ads", "true ."], "--method count"),
-        (&["estimate", SPACE, "--method", "probe", "--agent", "greedy"], "no weight"),
+        (&["estimate", SPACE, "--method", "probe", "--agent", "space-filling"], "no weight"),
         (&["estimate", SPACE, "--precision", "2"], "a share of the probability"),
         (&["estimate", SPACE, "--agent", "ddqn"], "has to be trained first"),
         (&["estimate", SPACE, "--than", "nobody"], "no driving system `nobody`"),

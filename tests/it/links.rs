@@ -400,7 +400,7 @@ fn make_home(home: &Path) {
         let run = ["--ads", "profile.yaml", "--episodes", "2", "--out", external];
         played(&[&["run", &space][..], &corner, &shard, &run].concat());
     }
-    let train = ["--agent", "av-fuzzer", "--ads", "cc", "--episodes", "1", "--out", "searched"];
+    let train = ["--agent", "bandit", "--ads", "cc", "--episodes", "1", "--out", "searched"];
     played(&[&["train", &space][..], &corner, &train].concat());
     std::fs::remove_file(home.join("started")).expect("the driving system was started");
 }

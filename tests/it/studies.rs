@@ -88,7 +88,7 @@ fn what_another_study_has_played_is_taken_over() {
     let (_, first) = play(&file("first", 3, &agents), "first", &[]);
     let reuse = ["--reuse", &first.display().to_string()];
     let agents = format!(
-        "{{ name: random, label: dice, repeats: 3 }}, {}, {{ name: greedy, repeats: 1 }}",
+        "{{ name: random, label: dice, repeats: 3 }}, {}, {{ name: space-filling, repeats: 1 }}",
         tiny("tiny")
     );
     let second = file("second", 3, &agents);
@@ -134,7 +134,7 @@ fn what_another_study_has_played_is_taken_over() {
 
     for (name, seed, agents, reason) in [
         ("seeded", 4, "{ name: random }", "it plays otherwise: its `first_seed` is another"),
-        ("stranger", 3, "{ name: greedy }", "it has played no agent with the same settings on the same road"),
+        ("stranger", 3, "{ name: random-raw }", "it has played no agent with the same settings on the same road"),
     ] {
         let ((status, _, stderr), out) = play(&file(name, seed, agents), name, &reuse);
         assert!(status == 1 && stderr.contains(reason), "{status}: {stderr}");
@@ -146,7 +146,7 @@ fn what_another_study_has_played_is_taken_over() {
 /// makes the correction of the others stricter.
 #[test]
 fn two_baselines_are_compared_once() {
-    let text = "space: ../avastra45.ava\nagents: [{ name: none }, { name: random }, { name: greedy }]\n\
+    let text = "space: ../avastra45.ava\nagents: [{ name: none }, { name: random }, { name: space-filling }]\n\
                 baselines: [none, random]\n";
     let cell = |agent: &str, number: u32| avastra::study::CellRecord {
         agent: agent.to_owned(),
@@ -157,12 +157,12 @@ fn two_baselines_are_compared_once() {
         episodes: Vec::new(),
         spent: None,
     };
-    let cells = ["none", "random", "greedy"].map(|agent| [cell(agent, 0), cell(agent, 1)]).concat();
+    let cells = ["none", "random", "space-filling"].map(|agent| [cell(agent, 0), cell(agent, 1)]).concat();
     let found = avastra::study::StudyResults::new(loaded(text).settings(), &cells);
     let road = found.roads.iter().find(|road| road.road == "corner").expect("it was played");
     let counted = road.comparisons.iter().filter(|one| one.measure == "counted");
     let pairs: Vec<_> = counted.map(|one| (one.agent.as_str(), one.baseline.as_str())).collect();
-    assert_eq!(pairs, [("random", "none"), ("greedy", "none"), ("greedy", "random")]);
+    assert_eq!(pairs, [("random", "none"), ("space-filling", "none"), ("space-filling", "random")]);
     // Nothing was counted, which bounds the mean by what Poisson's events would have.
     let none = &road.agents[0].measures["counted"];
     let high = none.interval.and_then(|interval| interval.high).expect("two repetitions bound it");

@@ -90,7 +90,7 @@ pub fn compared<E>(
         let episode = comparison.episode(*number);
         let side = |run: &Run| {
             let setup = run.setup(episode);
-            let (log, _) = run.played(&setup);
+            let log = run.played(&setup);
             let happened = comparison.event.first(&setup, &log).is_some();
             Side { happened, failed: log.failure.is_some(), driven_m: log.distance_m }
         };

@@ -35,7 +35,7 @@ pub struct PartRecord {
     /// the part came.
     pub weight_squares: f64,
     pub weight_max: f64,
-    /// Everything that was simulated, branches and the ticks that lead up to them included, s. The replays of
+    /// Everything that was simulated, trials and the ticks that lead up to them included, s. The replays of
     /// verdicts are not in it, with any method.
     pub simulated_s: f64,
     /// Episodes that an external driving system failed in: such a part says nothing, and is not kept.
@@ -100,9 +100,9 @@ pub fn play_parts<E>(
 /// Crude Monte Carlo: an episode of a part from its start. Its event, if it met one.
 fn count(estimate: &Estimate, number: u32, record: &mut PartRecord) -> Vec<(Event, EpisodeLog)> {
     let setup = estimate.setup(record.part, number);
-    let (log, branched_s) = estimate.run().played(&setup);
+    let log = estimate.run().played(&setup);
     record.note_whole(&log);
-    record.simulated_s += log.duration_s + branched_s;
+    record.simulated_s += log.duration_s;
     record.weight_max = 1.0;
     let event = estimate.event(&setup, &log).map(|found| {
         let row = match log.steps.get(found.step).map(|step| &step.outcome) {

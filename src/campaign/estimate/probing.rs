@@ -117,7 +117,7 @@ fn sampled(
     let setup = estimate.setup(part, number);
     let mut rng = rng::stream(setup.seed, Stream::Estimate, 0);
     let mut agent = estimate.run().agent();
-    agent.begin();
+    agent.begin(setup.seed);
     let mut steps = Vec::new();
     let heaviest = &mut record.weight_max;
     let mut choices = |moment: &Moment| {
@@ -221,7 +221,7 @@ fn considered(
 /// and the simulated time, s.
 fn tried(estimate: &Estimate, setup: &Setup, from: Play, step: usize, draw: Draw) -> (EpisodeLog, f64) {
     let mut agent = estimate.run().agent();
-    agent.begin();
+    agent.begin(setup.seed);
     let mut first = Some(draw);
     let (mut begun_ticks, mut judged) = (0, 0);
     let mut choices = |moment: &Moment| {

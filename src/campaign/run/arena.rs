@@ -14,14 +14,13 @@ use avastra_drivers::external::{Attached, Program};
 use avastra_lang::model::{Reach, Road, Row, RulesInForce, Space};
 use avastra_lang::prove;
 use avastra_lang::syntax::listed;
-use avastra_search::agent::{Agent, Trial};
+use avastra_search::agent::Agent;
 use avastra_search::mdp::ProcKind;
-use avastra_world::action::{ActionTable, Offer, Situation};
+use avastra_world::action::{ActionTable, Offer};
 use avastra_world::sim::{Scene, Start, TrafficProfile};
 
 use crate::run::offered::Offered;
 use crate::run::settings::RunError;
-use crate::run::summary::EpisodeSummary;
 
 /// Everything that the episodes of a run or a training share.
 pub struct Arena {
@@ -164,9 +163,8 @@ pub fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) 
         let legal = legal(&offers);
         return (carry_out(offers, legal.view(), agent, moment), legal);
     }
-    let situation = situation(agent, moment);
     let table = &moment.setup().table;
-    let offer = |row| table.offer(&situation, row);
+    let offer = |row| table.offer(moment.situation, row);
     let all = Array1::from_elem(table.rows().len(), true);
     if !(0..all.len()).any(|row| offer(row).is_ok()) {
         return (Choice::Pass, all);
@@ -179,12 +177,11 @@ pub fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) 
 /// Lets an agent choose that asks for a few rows alone. What became of the first one is noted.
 pub(crate) fn choose_only(agent: &mut dyn Agent, moment: &Moment, offered: &mut Offered) -> Choice {
     let table = &moment.setup().table;
-    let situation = situation(agent, moment);
     let rows = agent.only().to_vec();
     let mut legal = Array1::from_elem(table.rows().len(), false);
     let mut offers: Vec<(usize, Offer)> = Vec::new();
     for row in rows {
-        let offer = table.offer(&situation, row);
+        let offer = table.offer(moment.situation, row);
         if offers.is_empty() {
             offered.note_one(table.rows().len(), row, &offer);
         }
@@ -201,16 +198,9 @@ pub(crate) fn choose_only(agent: &mut dyn Agent, moment: &Moment, offered: &mut 
 
 /// What each row would do now.
 pub(crate) fn offers(agent: &mut dyn Agent, moment: &Moment) -> Vec<Offer> {
-    let situation = situation(agent, moment);
     agent.weigh(&|| moment.setup().table.odds(moment.situation));
     let shares = agent.draw_shares(moment.step, moment.situation.seed);
-    moment.setup().table.offers_at(&situation, shares)
-}
-
-/// The situation of the moment, with values drawn from the agent's seed if it gives one.
-fn situation<'a>(agent: &mut dyn Agent, moment: &Moment<'a>) -> Situation<'a> {
-    let seed = agent.draw_seed(moment.step).unwrap_or(moment.situation.seed);
-    Situation { seed, ..*moment.situation }
+    moment.setup().table.offers_at(moment.situation, shares)
 }
 
 /// The agent's own randomness in this step.
@@ -233,27 +223,8 @@ pub(crate) fn carry_out(
     if !legal.iter().any(|&is_legal| is_legal) {
         return Choice::Pass;
     }
-    let branch = |row: usize| tried(&offers[row], moment);
-    let row = agent.choose_ahead(moment.observation, legal, &branch, &mut exploration(moment));
+    let row = agent.choose(moment.observation, legal, &mut exploration(moment));
     row.map_or(Choice::Pass, |row| Choice::of(row, offers.swap_remove(row)))
-}
-
-/// Carries an offer out in a copy of the moment's world, and judges the collisions as in an episode.
-fn tried(offer: &Offer, moment: &Moment) -> Trial {
-    let Ok(draw) = offer else { return Trial::default() };
-    let log = moment.look_ahead(draw.clone());
-    let step = moment.step;
-    let collided = log.collisions.iter().any(|collision| collision.step == step);
-    let counts = || {
-        let summary = EpisodeSummary::judged(moment.setup(), 0, &log);
-        summary.collisions.iter().any(|finding| finding.counted && finding.collision.step == step)
-    };
-    Trial {
-        proc: log.steps[step].proc,
-        collided,
-        counted: collided && counts(),
-        simulated_s: log.duration_s - log.steps[step].time_s,
-    }
 }
 
 /// The first name that comes a second time.

@@ -24,7 +24,7 @@ use crate::run::settled::{Units, WrittenScenario};
 use crate::run::summary::{EpisodeSummary, Finding};
 
 pub(crate) const LAYOUT: Layout = Layout {
-    version: 16,
+    version: 17,
     schema: || format!("{SCHEMA}{}", step_table()),
     unit: "episode",
     tables: &[
@@ -46,8 +46,8 @@ pub(crate) const LAYOUT: Layout = Layout {
     sound: &[
         (
             "episode",
-            "min(duration_s, distance_m, steps, red_runs, collisions, counted, branched_s) >= 0
-           AND max(duration_s, distance_m, steps, red_runs, collisions, counted, branched_s) <= 1e9
+            "min(duration_s, distance_m, steps, red_runs, collisions, counted) >= 0
+           AND max(duration_s, distance_m, steps, red_runs, collisions, counted) <= 1e9
            AND coalesce(first_counted_s, 0) BETWEEN 0 AND 1e9",
         ),
         ("collision", "time_s BETWEEN 0 AND 1e9 AND max(abs(ego_speed_mps), abs(delta_v_mps)) <= 1e9"),
@@ -77,8 +77,7 @@ const SCHEMA: &str = "
 CREATE TABLE episode (
   episode INTEGER PRIMARY KEY, road TEXT NOT NULL, seed TEXT NOT NULL, ended TEXT NOT NULL,
   duration_s REAL NOT NULL, distance_m REAL NOT NULL, steps INTEGER NOT NULL, red_runs INTEGER NOT NULL,
-  collisions INTEGER NOT NULL, counted INTEGER NOT NULL, first_counted_s REAL, trace TEXT NOT NULL, pet_s REAL,
-  branched_s REAL NOT NULL
+  collisions INTEGER NOT NULL, counted INTEGER NOT NULL, first_counted_s REAL, trace TEXT NOT NULL, pet_s REAL
 ) STRICT;
 CREATE TABLE collision (
   episode INTEGER NOT NULL REFERENCES episode, number INTEGER NOT NULL, time_s REAL NOT NULL,
@@ -377,7 +376,6 @@ impl Database {
                         (SELECT coalesce(sum(avoidability = 'avoidable'), 0) FROM collision),
                         (SELECT coalesce(sum(avoidability = 'beyond_reference'), 0) FROM collision),
                         (SELECT coalesce(sum(avoidability = 'unavoidable'), 0) FROM collision),
-                        coalesce(sum(branched_s), 0.0),
                         (SELECT coalesce(sum(priority = 'ego'), 0) FROM collision),
                         (SELECT coalesce(sum(priority = 'other'), 0) FROM collision),
                         coalesce(sum(ended = 'blocked'), 0), (SELECT count(*) FROM failure),
@@ -411,7 +409,6 @@ impl Database {
                         avoidable,
                         beyond_reference,
                         unavoidable,
-                        branched_s,
                         wronged,
                         wrong,
                         blocked,
@@ -519,8 +516,6 @@ pub struct Totals {
     pub avoidable: i64,
     pub beyond_reference: i64,
     pub unavoidable: i64,
-    /// Time that agents with lookahead simulated in branches, outside the episodes, s.
-    pub branched_s: f64,
     /// Collisions in which the ego vehicle had priority, and in which the other had; the rest is neither.
     pub wronged: i64,
     pub wrong: i64,
@@ -701,7 +696,6 @@ fn add_episode(
         summary.first_counted_s(),
         avastra_lang::model::digest_text(&log.trace()),
         summary.pet_s,
-        summary.branched_s,
     ];
     insert_row(transaction, "episode", values)
 }

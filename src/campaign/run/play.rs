@@ -108,20 +108,12 @@ impl Run {
 
     /// Plays one episode; numbers run through the roads one after another.
     pub fn episode(&self, number: usize) -> EpisodeLog {
-        self.played_by(&self.setup(number), self.agent_of(number)).0
+        played_by(&self.setup(number), self.agent_of(number).as_mut())
     }
 
-    /// Plays an episode of a setup with a fresh agent. Returns the log, and the time that the agent simulated in
-    /// branches, s.
-    pub fn played(&self, setup: &episode::Setup) -> (EpisodeLog, f64) {
-        self.played_by(setup, self.agent())
-    }
-
-    fn played_by(&self, setup: &episode::Setup, mut agent: Box<dyn Agent>) -> (EpisodeLog, f64) {
-        agent.begin();
-        let mut choose = |moment: &Moment| choose(agent.as_mut(), moment).0;
-        let log = episode::run(setup, &mut choose);
-        (log, agent.branched_s())
+    /// Plays an episode of a setup with a fresh agent.
+    pub fn played(&self, setup: &episode::Setup) -> EpisodeLog {
+        played_by(setup, self.agent().as_mut())
     }
 
     /// Plays one episode and judges its collisions.
@@ -131,7 +123,8 @@ impl Run {
 
     /// As [`Run::judged`], with another agent than the run's own.
     pub fn judged_by(&self, number: usize, agent: &mut dyn Agent) -> (EpisodeSummary, EpisodeLog) {
-        agent.begin();
+        let setup = self.setup(number);
+        agent.begin(setup.seed);
         let mut gauges = Gauges::default();
         let mut offered = Offered::default();
         let mut choose = |moment: &Moment| {
@@ -144,7 +137,6 @@ impl Run {
             carry_out(offers, legal.view(), agent, moment)
         };
         let log = self.play(number, &mut choose, &mut |world, _, contacts| gauges.note(world, contacts));
-        let setup = self.setup(number);
         let mut summary = EpisodeSummary::judged(&setup, number, &log);
         summary.find_keepers(&setup, &log);
         if let Some(last) = summary.last_step(&log) {
@@ -156,7 +148,6 @@ impl Run {
         summary.top_speeds_mps = gauges.top_speeds_mps(&log);
         summary.manners = gauges.manners();
         summary.offered = offered;
-        summary.branched_s = agent.branched_s();
         if self.settings.causes {
             summary.find_causes(&setup, &log).expect("a run with causes is against a system of modules");
         }
@@ -197,6 +188,12 @@ impl Run {
     pub fn agent(&self) -> Box<dyn Agent> {
         (self.agent)(0)
     }
+}
+
+/// Plays an episode of a setup with an agent.
+fn played_by(setup: &episode::Setup, agent: &mut dyn Agent) -> EpisodeLog {
+    agent.begin(setup.seed);
+    episode::run(setup, &mut |moment: &Moment| choose(agent, moment).0)
 }
 
 /// Plays and judges episodes on `jobs` threads and hands each to `done` on this one, in the order in

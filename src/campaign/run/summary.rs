@@ -26,8 +26,6 @@ pub struct EpisodeSummary {
     pub pet_s: Option<f64>,
     /// How the ego vehicle kept to limit and lane; zeros if the episode was not measured.
     pub manners: Manners,
-    /// Time that an agent with lookahead simulated in branches, outside the episode, s.
-    pub branched_s: f64,
     /// The offers of every row; empty if the episode is not a run's.
     pub offered: Offered,
 }

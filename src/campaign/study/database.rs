@@ -13,7 +13,7 @@ use crate::study::settings::StudySettings;
 
 /// Versions begin at 1001, so that a `run.db` is never taken for a `study.db`.
 const LAYOUT: Layout = Layout {
-    version: 1006,
+    version: 1007,
     schema: || SCHEMA.to_owned(),
     unit: "cell",
     tables: &["cell", "trained", "evaluated", "collision"],
@@ -24,8 +24,8 @@ const LAYOUT: Layout = Layout {
         ("trained", "simulated_s BETWEEN 0 AND 1e9 AND abs(return) <= 1e12"),
         (
             "evaluated",
-            "min(duration_s, distance_m, red_runs, speeding_s, astray_s, branched_s) >= 0
-           AND max(duration_s, distance_m, red_runs, speeding_s, astray_s, branched_s) <= 1e9",
+            "min(duration_s, distance_m, red_runs, speeding_s, astray_s) >= 0
+           AND max(duration_s, distance_m, red_runs, speeding_s, astray_s) <= 1e9",
         ),
         ("collision", "time_s BETWEEN 0 AND 1e9"),
     ],
@@ -45,7 +45,7 @@ CREATE TABLE trained (
 CREATE TABLE evaluated (
   cell INTEGER NOT NULL REFERENCES cell, episode INTEGER NOT NULL, seed TEXT NOT NULL, number INTEGER NOT NULL,
   ended TEXT NOT NULL, duration_s REAL NOT NULL, distance_m REAL NOT NULL, red_runs INTEGER NOT NULL,
-  speeding_s REAL NOT NULL, astray_s REAL NOT NULL, branched_s REAL NOT NULL, trace TEXT NOT NULL, PRIMARY KEY (cell, episode)
+  speeding_s REAL NOT NULL, astray_s REAL NOT NULL, trace TEXT NOT NULL, PRIMARY KEY (cell, episode)
 ) STRICT;
 CREATE TABLE collision (
   cell INTEGER NOT NULL REFERENCES cell, episode INTEGER NOT NULL, number INTEGER NOT NULL, time_s REAL NOT NULL,
@@ -162,8 +162,7 @@ impl StudyDatabase {
             cells.entry(cell).and_modify(|cell| cell.trained.push(episode));
         }
         let evaluated = self.by_cell(
-            "SELECT cell, seed, number, ended, duration_s, distance_m, red_runs, speeding_s, astray_s, branched_s,
-                    trace
+            "SELECT cell, seed, number, ended, duration_s, distance_m, red_runs, speeding_s, astray_s, trace
              FROM evaluated ORDER BY cell, episode",
             evaluated_episode,
         )?;
@@ -212,7 +211,6 @@ fn add_episode(
         episode.red_runs,
         episode.speeding_s,
         episode.astray_s,
-        episode.branched_s,
         episode.trace,
     ];
     insert_row(connection, "evaluated", values)?;
@@ -259,8 +257,7 @@ fn evaluated_episode(row: &Row) -> Result<EpisodeRecord, rusqlite::Error> {
         red_runs: row.get(6)?,
         speeding_s: row.get(7)?,
         astray_s: row.get(8)?,
-        branched_s: row.get(9)?,
-        trace: row.get(10)?,
+        trace: row.get(9)?,
         collisions: Vec::new(),
     })
 }

@@ -91,7 +91,7 @@ pub const MEASURES: &[Measure] = &[
     }),
     // Counted collisions of the training.
     shown("training_counted", |cell, _| of_training(cell, |episode| f64::from(episode.counted))),
-    // Counted collisions of an hour of everything that was simulated: trainings, branches and evaluations.
+    // Counted collisions of an hour of everything that was simulated: trainings and evaluations.
     compared("counted_per_h", |cell, _| {
         let trained = |of: fn(&TrainedRecord) -> f64| of_training(cell, of).unwrap_or(0.0);
         let all_h = evaluation_h(cell) + trained(|episode| episode.simulated_s) / 3600.0;
@@ -176,9 +176,9 @@ fn number(
     per_seed(cell, plan, |episode| episode.collisions.iter().filter(|found| is_meant(found)).count() as f64)
 }
 
-/// Simulated time of the evaluation, branches included, h.
+/// Simulated time of the evaluation, h.
 fn evaluation_h(cell: &CellRecord) -> f64 {
-    cell.episodes.iter().map(|episode| episode.duration_s + episode.branched_s).sum::<f64>() / 3600.0
+    cell.episodes.iter().map(|episode| episode.duration_s).sum::<f64>() / 3600.0
 }
 
 /// Counted collisions of an episode, of which at most one with a pedestrian: the published package calls every

@@ -152,7 +152,7 @@ impl Played {
         self.cells.iter().map(|cell| cell.wall_s).sum()
     }
 
-    /// Simulated time of all trainings, branches and evaluations, h.
+    /// Simulated time of all trainings and evaluations, h.
     pub fn simulated_h(&self) -> f64 {
         let sum = |measure: &str, cells: &mut dyn Iterator<Item = &MeasuredCell>| -> f64 {
             cells.filter_map(|cell| cell.value(measure)).sum()

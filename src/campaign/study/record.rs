@@ -43,7 +43,7 @@ pub struct TrainedRecord {
     pub counted: u32,
     pub exploration_epsilon: f64,
     pub loss: Option<f64>,
-    /// Time simulated for it, s: branches included.
+    /// Time simulated for it, s.
     pub simulated_s: f64,
 }
 
@@ -56,8 +56,6 @@ pub struct EpisodeRecord {
     pub number: u32,
     pub ended: String,
     pub duration_s: f64,
-    /// Time that an agent with lookahead simulated in branches, outside the episode, s.
-    pub branched_s: f64,
     pub distance_m: f64,
     pub red_runs: u32,
     /// Time above the speed limit, s.
@@ -121,7 +119,6 @@ impl EpisodeRecord {
             number: summary.episode as u32,
             ended: log.end.name().to_owned(),
             duration_s: log.duration_s,
-            branched_s: summary.branched_s,
             distance_m: log.distance_m,
             red_runs: log.red_runs,
             speeding_s: summary.manners.speeding_s,

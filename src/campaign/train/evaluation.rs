@@ -27,7 +27,7 @@ pub struct Evaluation {
     pub return_mean: f64,
     /// SHA-256 over the traces of all episodes, in order.
     pub trace: [u8; 32],
-    /// Time simulated, branches included, s.
+    /// Time simulated, s.
     pub simulated_s: f64,
     /// Episodes that ended because an external driving system failed, by how it failed.
     pub failures: BTreeMap<FailureKind, u64>,
@@ -46,7 +46,7 @@ pub fn evaluate(
         let seed = rng::child_seed(seed, Stream::Evaluation, number);
         let setup = arena.setup((number % arena.roads() as u64) as usize, seed);
         let mut agent = make();
-        agent.begin();
+        agent.begin(seed);
         let mut choose = |moment: &episode::Moment| choose(agent.as_mut(), moment).0;
         let log = episode::run(&setup, &mut choose);
         let counted = EpisodeSummary::judged(&setup, number as usize, &log).counted() as u64;
@@ -54,7 +54,7 @@ pub fn evaluate(
         found.collisions += log.collisions.len() as u64;
         found.counted += counted;
         found.colliding += u64::from(counted > 0);
-        found.simulated_s += log.duration_s + agent.branched_s();
+        found.simulated_s += log.duration_s;
         if let End::Failed(kind) = log.end {
             *found.failures.entry(kind).or_default() += 1;
         }

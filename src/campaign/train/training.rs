@@ -8,24 +8,20 @@ use ndarray::Array1;
 
 use crate::episode;
 use crate::episode::{Choice, End, EpisodeLog, Moment, Play, Script, Setup};
-use crate::oracle;
 use crate::run::{
     Arena, EpisodeSummary, Finding, Profile, RunError, RunSettings, TrafficRecord, agent_named,
-    check_episodes, choose, kind, legal, traffic_of, under_test,
+    check_episodes, choose, legal, traffic_of, under_test,
 };
 use avastra_base::rng;
 use avastra_base::rng::Stream;
-use avastra_drivers::Ads;
 use avastra_drivers::external::Attached;
 use avastra_lang::model::Space;
-use avastra_lang::model::vocabulary::Word;
 use avastra_search::agent::{
-    Collided, Diverged, Experience, Kind, Lesson, Rows, Settings, Trainable, Trajectory,
+    Diverged, Experience, Kind, Lesson, Rows, Settings, Trainable, Trajectory,
 };
 use avastra_search::mdp;
-use avastra_search::mdp::{Closeness, Observation, ProcKind, StepOutcome};
+use avastra_search::mdp::{Observation, ProcKind, StepOutcome};
 use avastra_world::action::ActionTable;
-use avastra_world::sim::{Contact, World};
 
 /// Everything that is needed to repeat a training; written to `run.yaml`.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -110,7 +106,7 @@ pub struct TrainedEpisode {
     pub lesson: Lesson,
     /// Choices made in the training up to its end.
     pub steps: u64,
-    /// Time simulated for it, s: branches included.
+    /// Time simulated for it, s.
     pub simulated_s: f64,
 }
 
@@ -174,29 +170,23 @@ impl Training {
     pub fn episode(&mut self) -> Result<TrainedEpisode, Diverged> {
         let number = self.next;
         let road = number % self.arena.roads();
-        let fresh = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
+        let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
         self.agent.progress(number as f64 / f64::from(self.settings.episodes));
-        let start_seed = self.agent.start_seed(road, fresh);
         let exploration_epsilon = self.agent.exploration_epsilon();
-        let mut setup = self.arena.setup(road, start_seed);
+        let mut setup = self.arena.setup(road, seed);
         setup.start.ambient = self.settings.ambient;
         setup.proc = self.settings.hyperparameters.proc();
-        self.agent.begin();
-        let played = play(&setup, self.agent.as_mut(), &self.settings);
+        self.agent.begin(seed);
+        let played = play(&setup, self.agent.as_mut());
 
         let log = played.log;
-        let summary = EpisodeSummary {
-            branched_s: self.agent.branched_s(),
-            ..EpisodeSummary::judged(&setup, number, &log)
-        };
+        let summary = EpisodeSummary::judged(&setup, number, &log);
         let (last, last_legal) = played.last.expect("every episode has a last moment");
         let trajectory = Trajectory {
             steps: experiences(&self.settings.hyperparameters, played.choices, &log, &summary),
             last,
             last_legal,
             terminal: log.end == End::Arrived,
-            closeness: played.closeness,
-            collisions: summary.collisions.iter().map(collided).collect(),
         };
         let mut rng = rng::stream(self.settings.seed, Stream::Replay, number as u64);
         let lesson = self.agent.learn(&trajectory, &mut rng)?;
@@ -206,7 +196,7 @@ impl Training {
             exploration_epsilon,
             lesson,
             steps: self.agent.steps(),
-            simulated_s: log.duration_s + summary.branched_s,
+            simulated_s: log.duration_s,
             log,
             summary,
         })
@@ -233,14 +223,11 @@ struct Unjudged {
     choices: Vec<Chosen>,
     /// The observation after the last step, and the rows that were legal then, shape `(rows,)`.
     last: Option<(Observation, Array1<bool>)>,
-    closeness: Closeness,
 }
 
-fn play(setup: &Setup, agent: &mut dyn Trainable, settings: &TrainSettings) -> Unjudged {
-    let searches = settings.hyperparameters.learner().is_none();
+fn play(setup: &Setup, agent: &mut dyn Trainable) -> Unjudged {
     let mut choices = Vec::new();
     let mut last = None;
-    let mut closeness = Closeness::default();
     let looks_at_mask = agent.looks_at_mask();
     let mut make_choice = |moment: &Moment| {
         let (choice, legal) = choose(agent, moment);
@@ -254,11 +241,6 @@ fn play(setup: &Setup, agent: &mut dyn Trainable, settings: &TrainSettings) -> U
         choices.extend(row.map(|row| Chosen { step: moment.step, observation, legal, row }));
         choice
     };
-    let mut watch = |world: &World, _: &dyn Ads, _: &[Contact]| {
-        if searches {
-            closeness.note(world);
-        }
-    };
     let mut at_last = |moment: &Moment| {
         let table = &moment.setup().table;
         let legal = match looks_at_mask {
@@ -267,8 +249,8 @@ fn play(setup: &Setup, agent: &mut dyn Trainable, settings: &TrainSettings) -> U
         };
         last = Some((moment.observation.clone(), legal));
     };
-    let log = episode::run_from(Play::new(setup), &mut make_choice, &mut watch, &mut at_last);
-    Unjudged { log, choices, last, closeness }
+    let log = episode::run_from(Play::new(setup), &mut make_choice, &mut |_, _, _| {}, &mut at_last);
+    Unjudged { log, choices, last }
 }
 
 /// A choice of the agent, with the observation and the legal rows that it was made on.
@@ -277,17 +259,6 @@ struct Chosen {
     observation: Observation,
     legal: Array1<bool>,
     row: usize,
-}
-
-/// What a search is told of a collision.
-fn collided(finding: &Finding) -> Collided {
-    let mechanism = (kind(finding.collision.body.like.name()), finding.collision.verb.name());
-    let severity = oracle::severity(&finding.collision);
-    let (priority, side) = (finding.facts.priority.name(), severity.side);
-    Collided {
-        kind: format!("{} {}, priority {priority}, {} {side}", mechanism.0, mechanism.1, severity.approach),
-        counted: finding.counted,
-    }
 }
 
 /// The reward and the consequences of each choice. A step in which nothing could be chosen teaches nothing.

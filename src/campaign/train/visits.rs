@@ -37,8 +37,8 @@ impl VisitingPolicy {
 }
 
 impl Agent for VisitingPolicy {
-    fn begin(&mut self) {
-        self.policy.begin();
+    fn begin(&mut self, seed: u64) {
+        self.policy.begin(seed);
     }
 
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
@@ -80,7 +80,7 @@ pub(super) fn visits(
         let seed = rng::child_seed(seed, stream, first + number);
         let setup = arena.setup((number % arena.roads() as u64) as usize, seed);
         let mut agent = visiting.clone();
-        agent.begin();
+        agent.begin(seed);
         episode::run(&setup, &mut |moment: &Moment| choose(&mut agent, moment).0);
     }
     visiting.visits()

@@ -75,7 +75,7 @@ impl Session {
             Err(mut broken) => {
                 if broken.problem == Problem::NoAnswer && settings.command.is_socket() {
                     broken.detail.push_str(
-                        "; a program that serves one connection at a time needs `--jobs 1` and no agent that looks ahead",
+                        "; a program that serves one connection at a time needs `--jobs 1`",
                     );
                 }
                 Err(failed(&mut link, broken, "init"))

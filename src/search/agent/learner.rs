@@ -119,8 +119,8 @@ impl Learner {
 }
 
 impl Agent for Learner {
-    fn begin(&mut self) {
-        self.policy.begin();
+    fn begin(&mut self, seed: u64) {
+        self.policy.begin(seed);
     }
 
     /// ε-greedy over the open rows.

@@ -4,7 +4,7 @@
 //! [`Observation`](crate::mdp::Observation) and the mask of rows that the rules allow, never the world.
 //! [`REGISTRY`] has every agent by name.
 //!
-//! - `random`, `space-filling` and `greedy` need no training; `every-row` plays each row once.
+//! - `random` and `space-filling` need no training; `every-row` plays each row once.
 //! - [`Trainable`] agents take in a [`Trajectory`] when an episode has ended and has been judged.
 //! - The [`Learner`] is deep Q-learning; [`improve`] is one update. `exploration` says how often it chooses at random,
 //!   `payment` what a step earns, `n_step` makes transitions of an episode, `replay` keeps them, `network` computes
@@ -12,16 +12,14 @@
 //! - `shuffled` shows a policy states of other episodes, to tell whether it has learned when.
 //! - A [`QPolicy`] acts by a trained network, or by the rules that `decision` distils from it; `features`
 //!   says what a network sees.
-//! - `search` has the searches: AV-Fuzzer, MAP-Elites, constant rows and a bandit.
+//! - `search` has the searches: constant rows and a bandit.
 //! - [`Settings`] are those of any trainable agent; each agent's own stand beside it. [`LearnerSettings`] are those of
 //!   a learner, the settings of its parts included, and `presets` their values, by source.
 
-mod branch;
 mod checkpoint;
 mod decision;
 mod exploration;
 mod features;
-mod greedy;
 mod learner;
 mod n_step;
 mod network;
@@ -40,7 +38,6 @@ mod space_filling;
 mod trainable;
 mod trajectory;
 
-pub use branch::{Branch, Trial};
 pub use decision::{Visit, chosen_by, distilled};
 pub use features::Features;
 pub use learner::{Learner, LearnerSettings, Loss, improve};
@@ -50,4 +47,4 @@ pub use registry::{Agent, Entry, Kind, REGISTRY, by_name};
 pub use replay::Transition;
 pub use settings::{Settings, SettingsError};
 pub use trainable::{Diverged, Trainable};
-pub use trajectory::{Collided, Experience, Lesson, Trajectory};
+pub use trajectory::{Experience, Lesson, Trajectory};

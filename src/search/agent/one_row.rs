@@ -25,7 +25,7 @@ impl OneRow {
 }
 
 impl Agent for OneRow {
-    fn begin(&mut self) {
+    fn begin(&mut self, _: u64) {
         self.open.clone_from(&self.rows);
     }
 

@@ -207,7 +207,7 @@ impl QPolicy {
 
 /// The trained policy.
 impl Agent for QPolicy {
-    fn begin(&mut self) {
+    fn begin(&mut self, _: u64) {
         self.quirks.begin();
     }
 

@@ -8,33 +8,21 @@ use crate::mdp::Observation;
 use avastra_base::rng::Rng;
 use avastra_world::action::RowOdds;
 
-use super::branch::Branch;
 use super::presets::Preset;
-use super::search::{AvFuzzerSettings, BanditSettings, ConstantSettings, MapElitesSettings};
+use super::search::{BanditSettings, ConstantSettings};
 use super::settings::{Settings, SettingsError, changed};
-use super::{greedy, one_row, presets, random, space_filling};
+use super::{one_row, presets, random, space_filling};
 
 /// Chooses rows of the action table.
 pub trait Agent: Send {
-    /// A new episode begins.
-    fn begin(&mut self) {}
+    /// An episode of that seed begins.
+    fn begin(&mut self, _seed: u64) {}
 
     /// A step begins, in which the space gives the rows these odds.
     fn weigh(&mut self, _odds: &dyn Fn() -> Vec<RowOdds>) {}
 
     /// The row to carry out next, or none. `legal` has shape `(rows,)`; at least one is true.
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize>;
-
-    /// As [`Agent::choose`], for an agent that tries rows out before it chooses.
-    fn choose_ahead(
-        &mut self,
-        observation: &Observation,
-        legal: ArrayView1<bool>,
-        _branch: &Branch<'_>,
-        rng: &mut Rng,
-    ) -> Option<usize> {
-        self.choose(observation, legal, rng)
-    }
 
     /// Whether the choice, or what is learned of it, depends on which rows are legal. If not, only the chosen row is
     /// drawn, and all others pass for legal.
@@ -47,11 +35,6 @@ pub trait Agent: Send {
         &[]
     }
 
-    /// A step begins: the seed for its draws, or `None` if they come from the episode's own.
-    fn draw_seed(&mut self, _step: usize) -> Option<u64> {
-        None
-    }
-
     /// A step begins in an episode of that seed: where in their ranges the drawn values of the row shall lie, each in
     /// `[0, 1)`, by parameter; what is left out is drawn by chance.
     fn draw_shares(&mut self, _step: usize, _seed: u64) -> &[f64] {
@@ -62,16 +45,6 @@ pub trait Agent: Send {
     /// `None` for an agent that knows no probabilities.
     fn chances(&self, _legal: ArrayView1<bool>) -> Option<Array1<f64>> {
         None
-    }
-
-    /// Whether it tries rows out before it chooses.
-    fn looks_ahead(&self) -> bool {
-        false
-    }
-
-    /// Time driven in branches since the episode began, s.
-    fn branched_s(&self) -> f64 {
-        0.0
     }
 }
 
@@ -133,25 +106,6 @@ pub const REGISTRY: &[Entry] = &[
         kind: Kind::Learning(presets::DEEP_COLLISION),
     },
     Entry {
-        name: "greedy",
-        summary: "one step of lookahead: tries every legal row in a copy of the world, takes the most dangerous",
-        kind: Kind::Ready(|| Box::new(greedy::Greedy::default())),
-    },
-    Entry {
-        name: "av-fuzzer",
-        summary: "AV-Fuzzer's genetic search over scripts of rows",
-        kind: Kind::Searching(|changes| {
-            changed(&AvFuzzerSettings::default(), changes).map(Settings::AvFuzzer)
-        }),
-    },
-    Entry {
-        name: "map-elites",
-        summary: "the best script of every kind of collision, and new ones by changing those",
-        kind: Kind::Searching(|changes| {
-            changed(&MapElitesSettings::default(), changes).map(Settings::MapElites)
-        }),
-    },
-    Entry {
         name: "constant",
         summary: "a fixed list of rows, those first that crashed most in training: the first legal one acts",
         kind: Kind::Searching(|changes| {
@@ -189,8 +143,7 @@ mod tests {
 
     use super::*;
     use crate::agent::settings::Configured;
-    use crate::agent::{Collided, Experience, Rows, Trainable, Trajectory};
-    use crate::mdp::Closeness;
+    use crate::agent::{Experience, Rows, Trainable, Trajectory};
     use avastra_base::rng::{Stream, child_seed, stream};
 
     const ROWS: usize = 5;
@@ -210,9 +163,7 @@ mod tests {
                 presets.iter().map(learner).collect()
             }
             Kind::Searching(read) => {
-                let mut search = read(Map::new()).unwrap().build(rows(), seed);
-                assert_eq!(search.start_seed(0, seed), seed, "it knows no other start yet");
-                vec![(search, true)]
+                vec![(read(Map::new()).unwrap().build(rows(), seed), true)]
             }
         }
     }
@@ -224,17 +175,15 @@ mod tests {
             let choices = |seed| -> Vec<Vec<Option<usize>>> {
                 let choices = |(mut agent, obeys): (Box<dyn Agent>, bool)| {
                     let mut rng = stream(seed, Stream::Exploration, 0);
-                    agent.begin();
+                    agent.begin(seed);
                     let observation = Observation::zeros();
                     let choose = |step| {
-                        agent.draw_seed(step);
                         agent.draw_shares(step, seed);
                         agent.choose(&observation, legal.view(), &mut rng)
                     };
                     let chosen: Vec<Option<usize>> = (0..50).map(choose).collect();
                     let fits = |row: &usize| *row < ROWS && (legal[*row] || !obeys);
                     assert!(chosen.iter().flatten().all(fits), "{}", entry.name);
-                    assert_eq!(agent.branched_s(), 0.0, "{}: it has tried nothing", entry.name);
                     chosen
                 };
                 fresh(entry, seed).into_iter().map(choices).collect()
@@ -266,8 +215,6 @@ mod tests {
             Experience { hits: vec![0], crashes: vec![Some(0)], ..Experience::plain(row, 7.5, ROWS) }
         };
         Trajectory {
-            closeness: Closeness { distance_m: 5.0 + rows[0] as f64, margin_m: 0.0 },
-            collisions: vec![Collided { kind: format!("walk {}", rows[0]), counted: true }],
             ..Trajectory::plain(rows.iter().enumerate().map(experience).collect(), ROWS)
         }
     }
@@ -286,11 +233,10 @@ mod tests {
             let Some(settings) = Settings::from_yaml(entry, None, text) else { continue };
             let settings = settings.unwrap();
             let play = |agent: &mut Box<dyn Trainable>, number: u64| {
-                let seed = agent.start_seed((number % 2) as usize, child_seed(9, Stream::Episode, number));
-                agent.begin();
+                let seed = child_seed(9, Stream::Episode, number);
+                agent.begin(seed);
                 let mut chosen = Vec::new();
                 for step in 0..6 {
-                    agent.draw_seed(step);
                     let mut rng = stream(seed, Stream::Exploration, step as u64);
                     let legal = Array1::from_elem(ROWS, true);
                     chosen.push(agent.choose(&Observation::zeros(), legal.view(), &mut rng).unwrap());

@@ -16,7 +16,7 @@ use super::learner::LearnerSettings;
 use super::presets::Preset;
 use super::q_policy::Rows;
 use super::registry::{Entry, Kind, REGISTRY};
-use super::search::{AvFuzzerSettings, BanditSettings, ConstantSettings, MapElitesSettings};
+use super::search::{BanditSettings, ConstantSettings};
 use super::trainable::Trainable;
 
 /// All settings of one agent. In a file, the names of the settings tell which kind of agent it is.
@@ -24,10 +24,8 @@ use super::trainable::Trainable;
 #[serde(untagged)]
 pub enum Settings {
     Learning(Box<LearnerSettings>),
-    AvFuzzer(AvFuzzerSettings),
     Constant(ConstantSettings),
     Bandit(BanditSettings),
-    MapElites(MapElitesSettings),
 }
 
 /// What the settings of every agent can do.
@@ -70,10 +68,8 @@ macro_rules! each {
     ($settings:expr, $own:ident => $done:expr) => {
         match $settings {
             Settings::Learning($own) => $done,
-            Settings::AvFuzzer($own) => $done,
             Settings::Constant($own) => $done,
             Settings::Bandit($own) => $done,
-            Settings::MapElites($own) => $done,
         }
     };
 }

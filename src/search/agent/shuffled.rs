@@ -24,8 +24,8 @@ pub(super) struct Shuffled {
 }
 
 impl Agent for Shuffled {
-    fn begin(&mut self) {
-        self.policy.begin();
+    fn begin(&mut self, seed: u64) {
+        self.policy.begin(seed);
     }
 
     fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {

@@ -13,17 +13,10 @@ pub struct Diverged {
     pub update: u64,
 }
 
-/// An agent in training. An episode is: `progress`, `start_seed`, [`Agent::begin`], a choice for each
-/// step, `learn`.
+/// An agent in training. An episode is: `progress`, [`Agent::begin`], a choice for each step, `learn`.
 pub trait Trainable: Agent {
     /// The share of the training's episodes that are over, in `[0, 1)`; told before each episode.
     fn progress(&mut self, _over: f64) {}
-
-    /// The seed of the next episode's start, on the nth of the roads. `fresh` is a seed that no episode had
-    /// before; an agent that returns to an old start gives that start's seed instead.
-    fn start_seed(&mut self, _road: usize, fresh: u64) -> u64 {
-        fresh
-    }
 
     /// Takes in an episode that has been judged.
     ///

@@ -5,7 +5,7 @@
 
 use ndarray::Array1;
 
-use crate::mdp::{Closeness, Observation};
+use crate::mdp::Observation;
 
 /// The choices of one episode, in order.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,18 +17,6 @@ pub struct Trajectory {
     pub last_legal: Array1<bool>,
     /// Whether the episode came to an end of its own (arrival), as opposed to being cut off.
     pub terminal: bool,
-    /// How close other road users came; measured for searches only.
-    pub closeness: Closeness,
-    /// Its collisions, in order.
-    pub collisions: Vec<Collided>,
-}
-
-/// What kind of collision it was.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Collided {
-    /// Mechanism, priority and geometry, in words: what the obstacle did, who went first, which side was hit.
-    pub kind: String,
-    pub counted: bool,
 }
 
 /// One choice and what it was worth.
@@ -79,8 +67,6 @@ impl Trajectory {
             last: Observation::zeros(),
             last_legal: Array1::from_elem(rows, true),
             terminal: true,
-            closeness: Closeness::default(),
-            collisions: Vec::new(),
         }
     }
 }

@@ -4,7 +4,6 @@
 //! `criticality` has the usual measures of danger beside them. A space may define a reward of its own
 //! (`reward { … }`), which `model` evaluates.
 
-mod closeness;
 mod collision_probability;
 mod criticality;
 mod observation;
@@ -12,7 +11,6 @@ mod released_probability;
 mod reward;
 mod state;
 
-pub use closeness::Closeness;
 pub use collision_probability::{Danger, ProcKind};
 pub use criticality::{Criticality, LeastEncroachment};
 pub use observation::{Observation, variable};

@@ -13,7 +13,7 @@ use crate::agent::trainable::{Diverged, Trainable};
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use avastra_base::rng;
-use avastra_base::rng::{Rng, Stream};
+use avastra_base::rng::Rng;
 
 use super::situation::situation;
 use super::worth::{Doubt, Worth, worths};
@@ -76,10 +76,7 @@ impl Configured for BanditSettings {
 pub struct Bandit {
     settings: BanditSettings,
     saved: SavedBandit,
-    // The episode under way.
-    fresh: u64,
-    step: usize,
-    /// The situation and the row of each choice.
+    /// The situation and the row of each choice of the episode under way.
     made: Vec<(u32, usize)>,
 }
 
@@ -94,30 +91,23 @@ impl Bandit {
     /// A bandit over so many rows.
     pub fn new(settings: &BanditSettings, rows: usize) -> Bandit {
         let saved = SavedBandit { steps: 0, worth: Worth::new(rows) };
-        Bandit { settings: settings.clone(), saved, fresh: 0, step: 0, made: Vec::new() }
+        Bandit { settings: settings.clone(), saved, made: Vec::new() }
     }
 }
 
 impl Agent for Bandit {
-    fn begin(&mut self) {
+    fn begin(&mut self, _: u64) {
         self.made.clear();
-        self.step = 0;
-    }
-
-    fn draw_seed(&mut self, step: usize) -> Option<u64> {
-        self.step = step;
-        None
     }
 
     /// By the record for its share of the choices, else any legal row.
-    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
-        let mut rng = rng::stream(self.fresh, Stream::Search, 1 + self.step as u64);
+    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
         let here = situation(observation);
         let BanditSettings { record_share, prior_choices, doubt, .. } = self.settings;
-        let row = if rng::unit(&mut rng) < record_share {
-            self.saved.worth.best(here, legal, prior_choices, Doubt::Try(doubt), &mut rng)
+        let row = if rng::unit(rng) < record_share {
+            self.saved.worth.best(here, legal, prior_choices, Doubt::Try(doubt), rng)
         } else {
-            any(legal, &mut rng)
+            any(legal, rng)
         }?;
         self.saved.steps += 1;
         self.made.push((here, row));
@@ -126,11 +116,6 @@ impl Agent for Bandit {
 }
 
 impl Trainable for Bandit {
-    fn start_seed(&mut self, _: usize, fresh: u64) -> u64 {
-        self.fresh = fresh;
-        fresh
-    }
-
     fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Result<Lesson, Diverged> {
         assert_eq!(self.made.len(), episode.steps.len(), "each choice is an experience");
         for (&(here, row), value) in self.made.iter().zip(worths(episode, self.settings.credit_discount)) {

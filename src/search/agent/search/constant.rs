@@ -102,6 +102,12 @@ fn first_legal(order: &[usize], legal: ArrayView1<bool>) -> Option<usize> {
 }
 
 impl Agent for Constant {
+    fn begin(&mut self, seed: u64) {
+        let mut rng = rng::stream(seed, Stream::Search, 0);
+        self.order = self.ordered(Doubt::Try(self.settings.doubt), &mut rng);
+        self.has_led = false;
+    }
+
     fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
         let row = first_legal(&self.order, legal)?;
         self.has_led |= Some(&row) == self.order.first();
@@ -111,13 +117,6 @@ impl Agent for Constant {
 }
 
 impl Trainable for Constant {
-    fn start_seed(&mut self, _: usize, fresh: u64) -> u64 {
-        let mut rng = rng::stream(fresh, Stream::Search, 0);
-        self.order = self.ordered(Doubt::Try(self.settings.doubt), &mut rng);
-        self.has_led = false;
-        fresh
-    }
-
     fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Result<Lesson, Diverged> {
         let counted = episode.steps.iter().map(|step| step.crashes.len()).sum::<usize>() as f64;
         self.saved.all.note(counted);
@@ -175,7 +174,7 @@ mod tests {
         let all = Array1::from_elem(4, true);
         let mut led = [0; 4];
         for number in 0..200 {
-            search.start_seed(0, number);
+            search.begin(number);
             let leader = search.choose(&Observation::zeros(), all.view(), &mut rng).unwrap();
             led[leader] += 1;
             // Row 2 crashes in every second episode, row 0 in every fourth, the others never.
