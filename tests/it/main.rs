@@ -4,6 +4,7 @@
 mod agents;
 mod alarms;
 mod cases;
+mod circles;
 mod catalogue;
 mod command;
 mod corpus;

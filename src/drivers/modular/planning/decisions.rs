@@ -5,13 +5,11 @@
 //! only when the profile without it is cheaper by a margin, or when its object is gone: Apollo keeps decisions
 //! from cycle to cycle in the same spirit (`PATH_REUSE`, the sides of its speed bounds), the margin is ours.
 
-use crate::kit::Guide;
 use avastra_world::sim::VehicleParameters;
 
 use super::super::config::PlanningConfig;
 use super::claim::{Claim, Role, Stance};
-use super::st_graph::{Profile, Region};
-use super::trajectory::Point;
+use super::st_graph::{Profile, Region, Situation};
 
 #[derive(Debug, Clone, Default)]
 pub struct Decisions {
@@ -19,17 +17,6 @@ pub struct Decisions {
     taken: Vec<(u32, Stance)>,
     /// Buffer of a cycle: the regions of all claims.
     regions: Vec<Region>,
-}
-
-/// What a cycle's decisions are taken from.
-pub struct Situation<'a> {
-    pub config: &'a PlanningConfig,
-    pub guide: &'a Guide,
-    pub start: Point,
-    /// The first place at which a rule demands a stop, m; infinite if there is none.
-    pub stop_m: f64,
-    /// Without it each cycle decides anew.
-    pub hysteresis: bool,
 }
 
 impl Decisions {
@@ -109,6 +96,8 @@ impl Claim {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kit::Guide;
+    use crate::modular::planning::trajectory::Point;
     use crate::modular::planning::claim::testing::crosser;
     use crate::testing::straight;
 

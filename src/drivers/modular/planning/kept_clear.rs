@@ -10,7 +10,7 @@ use super::super::config::PlanningConfig;
 use super::super::junctions::Junctions;
 use super::super::prediction::Forecast;
 use super::claim::Claim;
-use super::planner::HORIZON_M;
+use super::HORIZON_M;
 use super::speed::Constraint;
 use super::standing::Standing;
 use super::trajectory::Point;

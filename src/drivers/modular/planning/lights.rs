@@ -13,7 +13,7 @@ use avastra_world::sim::{Scene, SignalColour, VehicleParameters};
 
 use super::super::config::PlanningConfig;
 use super::kept_clear::can_stop;
-use super::planner::HORIZON_M;
+use super::HORIZON_M;
 use super::speed::Constraint;
 use super::stages::{STOPPED_M, STOPPED_MPS};
 use super::trajectory::Point;

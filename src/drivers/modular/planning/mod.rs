@@ -22,3 +22,6 @@ mod trajectory;
 
 pub use nudge::LateralPlan;
 pub use planner::{Outlook, Planner};
+
+/// Claims and lights that begin farther ahead do not matter yet, m. Apollo's ST graph ends at 100.
+const HORIZON_M: f64 = 100.0;

@@ -12,7 +12,7 @@ use avastra_world::sim::{Scene, VehicleParameters};
 
 use super::super::config::PlanningConfig;
 use super::super::prediction::Forecast;
-use super::planner::HORIZON_M;
+use super::HORIZON_M;
 
 /// Apollo's `obstacle_lon_start_buffer` and `obstacle_lon_end_buffer`, m.
 const BEFORE_M: f64 = 3.0;

@@ -20,20 +20,19 @@ use super::super::config::{ModularConfig, PlanningConfig, Weaknesses};
 use super::super::junctions::Junctions;
 use super::super::prediction::Forecast;
 use super::claim::{Claim, Role, Stance};
-use super::decisions::{Decisions, Situation};
+use super::decisions::Decisions;
 use super::lane_change::LaneChanges;
 use super::lights::Lights;
 use super::nudge::LateralPlan;
 use super::rights::RouteRights;
 use super::sight_bound::SightBound;
 use super::speed::Constraint;
+use super::st_graph::Situation;
 use super::stages::Stages;
 use super::standing::Standing;
 use super::trajectory::{Point, Trajectory};
-use super::{kept_clear, speed};
+use super::{HORIZON_M, kept_clear, speed};
 
-/// Claims and lights that begin farther ahead do not matter yet, m. Apollo's ST graph ends at 100.
-pub(super) const HORIZON_M: f64 = 100.0;
 /// Traffic beside that is slower by more than this falls back by itself, m/s.
 const FALLS_BACK_MPS: f64 = 2.0;
 /// Rounds in which a plan is mended: each keeps clear of one more road user.

@@ -16,7 +16,7 @@ use avastra_world::sim::VehicleParameters;
 
 use super::super::config::PlanningConfig;
 use super::claim::{Claim, Role, Stance};
-use super::decisions::Situation;
+use super::trajectory::Point;
 
 /// Time between columns, s. Apollo's DP `unit_t`: 1.0; `total_time`: 7.0.
 const UNIT_S: f64 = 1.0;
@@ -41,6 +41,17 @@ const LEFT_PENALTY: f64 = 1e2;
 /// Cost of a moment inside a region: more than any way round it, but not infinite, so that a vehicle that is
 /// inside one finds the best way out. Ours.
 const INSIDE_COST: f64 = 1e9;
+
+/// What a cycle's decisions are taken from.
+pub struct Situation<'a> {
+    pub config: &'a PlanningConfig,
+    pub guide: &'a Guide,
+    pub start: Point,
+    /// The first place at which a rule demands a stop, m; infinite if there is none.
+    pub stop_m: f64,
+    /// Without it each cycle decides anew.
+    pub hysteresis: bool,
+}
 
 /// What the graph knows of a claim: where the front bumper must not be, m ahead of where it is now.
 #[derive(Debug, Clone, Copy)]
