@@ -572,8 +572,7 @@ fn what_is_not_deterministic_is_said_to_be_so_and_is_no_fault() {
     let toy = ["--not-deterministic", "--misbehave", "forgetful", "--blind"];
     let config = profile(scratch.path(), &toy, "1", "");
     let out = scratch.path().join("run");
-    let (status, result, stderr) =
-        run(&config, &out, &["--episodes", "2", "--seed", "3"]);
+    let (status, result, stderr) = run(&config, &out, &["--episodes", "2", "--seed", "3"]);
     assert_eq!((status, &result["totals"]["failed"]), (0, &0.into()), "{stderr}\n{result}");
     assert_eq!(result["reproducible"], false, "{result}");
     let program = cargo_bin("avastra").display().to_string();

@@ -134,7 +134,12 @@ fn what_another_study_has_played_is_taken_over() {
 
     for (name, seed, agents, reason) in [
         ("seeded", 4, "{ name: random }", "it plays otherwise: its `first_seed` is another"),
-        ("stranger", 3, "{ name: random-raw }", "it has played no agent with the same settings on the same road"),
+        (
+            "stranger",
+            3,
+            "{ name: random-raw }",
+            "it has played no agent with the same settings on the same road",
+        ),
     ] {
         let ((status, _, stderr), out) = play(&file(name, seed, agents), name, &reuse);
         assert!(status == 1 && stderr.contains(reason), "{status}: {stderr}");

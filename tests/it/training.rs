@@ -218,10 +218,7 @@ fn what_cannot_be_trained_is_said_so() {
         (&["train", space, "--agent", "bandit", "--preset", "paper"], "`bandit` has none"),
         (&["run", space, "--agent", "bandit"], "has to be trained first"),
         (&["train", space, "--agent", "random"], "nothing to learn"),
-        (
-            &["train", space, "--agent", "dqn"],
-            "`ddqn`, `deep_collision`, `constant` and `bandit`",
-        ),
+        (&["train", space, "--agent", "dqn"], "`ddqn`, `deep_collision`, `constant` and `bandit`"),
         (&["train", space, "--preset", "realesed"], "`avastra`, `paper` and `released`"),
         (&["train", space, "--config", &config], "did you mean `discount`?"),
         (&["run", space, "--agent", "ddqn"], "has to be trained first"),

@@ -16,9 +16,7 @@ use avastra_base::rng;
 use avastra_base::rng::Stream;
 use avastra_drivers::external::Attached;
 use avastra_lang::model::Space;
-use avastra_search::agent::{
-    Diverged, Experience, Kind, Lesson, Rows, Settings, Trainable, Trajectory,
-};
+use avastra_search::agent::{Diverged, Experience, Kind, Lesson, Rows, Settings, Trainable, Trajectory};
 use avastra_search::mdp;
 use avastra_search::mdp::{Observation, ProcKind, StepOutcome};
 use avastra_world::action::ActionTable;

@@ -74,9 +74,9 @@ impl Session {
             Ok(identity) => Ok(Session { link, identity, map: None, answered: None, missed: false, late: 0 }),
             Err(mut broken) => {
                 if broken.problem == Problem::NoAnswer && settings.command.is_socket() {
-                    broken.detail.push_str(
-                        "; a program that serves one connection at a time needs `--jobs 1`",
-                    );
+                    broken
+                        .detail
+                        .push_str("; a program that serves one connection at a time needs `--jobs 1`");
                 }
                 Err(failed(&mut link, broken, "init"))
             }

@@ -2,7 +2,7 @@
 
 use core::ops::Bound::{Excluded, Included};
 
-use super::settings::{SettingsError, count, require, unit, within};
+use super::checked::{SettingsError, count, require, unit, within};
 
 /// How ε falls in a training, and what it is afterwards.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -7,8 +7,8 @@
 mod settings;
 mod update;
 
-pub use settings::LearnerSettings;
-pub use update::{Loss, improve};
+pub use settings::{LearnerSettings, Loss};
+pub use update::improve;
 
 use std::sync::Arc;
 
@@ -16,18 +16,37 @@ use ndarray::ArrayView1;
 
 use crate::mdp::Observation;
 use avastra_base::rng;
-use avastra_base::rng::Rng;
+use avastra_base::rng::{Rng, Stream};
 
+use super::acting::Agent;
 use super::checkpoint::{Reader, Writer};
+use super::choice::Rows;
 use super::exploration::ExplorationSettings;
 use super::n_step::transitions;
 use super::network::{Adam, Network};
 use super::q_policy::QPolicy;
-use super::registry::Agent;
 use super::replay::{Replay, Transition};
 use super::shuffled::{STATES, Shuffled};
-use super::trainable::{Diverged, Trainable};
+use super::trainable::{Configured, Diverged, Trainable};
 use super::trajectory::{Lesson, Trajectory};
+
+impl Configured for LearnerSettings {
+    type Trained = Learner;
+
+    /// The learner with its parts; the first weights come from the seed.
+    fn build(&self, rows: Arc<Rows>, seed: u64) -> Learner {
+        let shape = QPolicy::shape(self, rows.allowed.len());
+        let mut rng = rng::stream(seed, Stream::Initialization, 0);
+        let network = Network::new(shape, self.network.initialization, &mut rng);
+        let adam = Adam::new(network.parameters().len(), self.learning_rate);
+        let policy = QPolicy::new(Arc::new(self.clone()), rows, network);
+        Learner::new(policy, Replay::new(self.replay), adam, self.exploration)
+    }
+
+    fn restore(&self, rows: Arc<Rows>, bytes: &[u8]) -> Option<Learner> {
+        self.build(rows, 0).restored(bytes)
+    }
+}
 
 /// A learning agent.
 pub struct Learner {

@@ -16,7 +16,10 @@
 //! - [`Settings`] are those of any trainable agent; each agent's own stand beside it. [`LearnerSettings`] are those of
 //!   a learner, the settings of its parts included, and `presets` their values, by source.
 
+mod acting;
+mod checked;
 mod checkpoint;
+mod choice;
 mod decision;
 mod exploration;
 mod features;
@@ -38,13 +41,16 @@ mod space_filling;
 mod trainable;
 mod trajectory;
 
+pub use acting::Agent;
+pub use checked::SettingsError;
+pub use choice::Rows;
 pub use decision::{Visit, chosen_by, distilled};
 pub use features::Features;
 pub use learner::{Learner, LearnerSettings, Loss, improve};
 pub use network::{Adam, Network, Shape};
-pub use q_policy::{Face, QPolicy, Rows};
-pub use registry::{Agent, Entry, Kind, REGISTRY, by_name};
+pub use q_policy::{Face, QPolicy};
+pub use registry::{Entry, Kind, REGISTRY, by_name};
 pub use replay::Transition;
-pub use settings::{Settings, SettingsError};
+pub use settings::Settings;
 pub use trainable::{Diverged, Trainable};
 pub use trajectory::{Experience, Lesson, Trajectory};

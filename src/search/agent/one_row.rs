@@ -5,7 +5,7 @@ use ndarray::ArrayView1;
 use crate::mdp::Observation;
 use avastra_base::rng::Rng;
 
-use super::registry::Agent;
+use super::acting::Agent;
 
 /// Chooses its row as soon as that is legal, and nothing after that. Until then it chooses the rows that make the road users
 /// appear about whom its row is, one after another.

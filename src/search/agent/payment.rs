@@ -3,7 +3,7 @@
 use crate::mdp::{ProcKind, RewardSettings};
 use avastra_lang::model::TICK_MS;
 
-use super::settings::{Requirement, SettingsError, require, unit, within};
+use super::checked::{Requirement, SettingsError, require, unit, within};
 use super::trajectory::Trajectory;
 
 /// The step and its reward.

@@ -1,14 +1,17 @@
 //! The presets: what the papers print, what their authors published, and ours.
 
+use serde_json::{Map, Value};
+
 use crate::mdp::ProcKind;
 
+use super::checked::{SettingsError, changed};
+use super::choice::ChoiceSettings;
 use super::decision::RulesSettings;
 use super::exploration::{Exploration, ExplorationSettings};
 use super::features::{Encoding, StateSet};
 use super::learner::{LearnerSettings, Loss};
 use super::network::{Initialization, NetworkSettings};
 use super::payment::{PaymentSettings, RewardSource};
-use super::q_policy::ChoiceSettings;
 use super::replay::ReplaySettings;
 
 /// Settings with a name.
@@ -29,6 +32,18 @@ pub const DEEP_COLLISION: &[Preset] = &[
     Preset { name: "paper", settings: deep_collision },
     Preset { name: "released", settings: deep_collision_released },
 ];
+
+/// Settings as a policy file records them.
+///
+/// # Errors
+/// An unknown setting, a value of the wrong kind or out of range, and if one is missing.
+pub(super) fn of_record(recorded: &Map<String, Value>) -> Result<LearnerSettings, SettingsError> {
+    let base = paper();
+    if let Some(missing) = base.record().keys().find(|name| !recorded.contains_key(*name)) {
+        return Err(SettingsError::Text(format!("the setting `{missing}` is missing")));
+    }
+    changed(&base, recorded.clone())
+}
 
 /// The paper as printed. What it leaves open is as in its published package, but for that package's
 /// faults; how long ε falls is DeepCollision's, which the paper refers to.

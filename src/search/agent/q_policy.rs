@@ -7,80 +7,21 @@ use ndarray::{Array1, ArrayView1, ArrayView2, Axis};
 use crate::mdp::Observation;
 use avastra_base::rng;
 use avastra_base::rng::Rng;
+use avastra_lang::model::Policy;
 use avastra_lang::model::policy::PolicyRule;
-use avastra_lang::model::{EffectDef, Policy};
 use avastra_world::action::ActionTable;
 
+use super::acting::Agent;
+use super::checked::SettingsError;
+use super::choice::Rows;
 use super::decision::chosen_by;
-use super::features::{Encoding, Features, StateSet};
+use super::features::Features;
 use super::learner::LearnerSettings;
 use super::network::{Network, Shape};
+use super::presets::of_record;
 use super::quirks::Quirks;
 use super::random::any;
-use super::registry::Agent;
-use super::settings::{SettingsError, hint};
 use super::trajectory::Trajectory;
-
-/// What the agent sees and may do.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct ChoiceSettings {
-    /// State variables that the agent sees (RQ2).
-    pub state: StateSet,
-    /// How these variables go into the network.
-    pub encoding: Encoding,
-    /// Names of the actions and groups that the agent may choose from (RQ2); empty: all.
-    pub actions: Vec<String>,
-    /// Whether the agent chooses only among rows that the rules allow. If not, a forbidden choice loses
-    /// the step.
-    pub masks_choice: bool,
-    /// Whether the learning target considers only rows that the rules allow.
-    pub masks_target: bool,
-    /// Steps that must pass between two changes of weather or time; 0: no gate. Published package: 5. A
-    /// quirk (see `quirks`).
-    pub environment_gate_steps: u32,
-}
-
-/// What an agent knows about the rows before any episode.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Rows {
-    /// Whether the agent may choose the row at all, shape `(rows,)`.
-    pub allowed: Vec<bool>,
-    /// Whether the row changes weather or time alone, and makes no road user appear, shape `(rows,)`.
-    pub environment: Vec<bool>,
-}
-
-impl Rows {
-    /// The rows of a table; `actions` names the actions and groups that are allowed, empty: all.
-    ///
-    /// # Errors
-    /// If the space has no action or group of such a name.
-    pub fn new(table: &ActionTable, actions: &[String]) -> Result<Rows, SettingsError> {
-        let space = table.space();
-        let mut allowed = vec![actions.is_empty(); space.actions.len()];
-        for name in actions {
-            let action = space.actions.iter().position(|action| action.name == *name);
-            let group = space.groups.iter().find(|group| group.name == *name);
-            match (action, group) {
-                (Some(action), _) => allowed[action] = true,
-                (None, Some(group)) => group.actions.iter().for_each(|&action| allowed[action] = true),
-                (None, None) => {
-                    let actions = space.actions.iter().map(|action| action.name.as_str());
-                    let groups = space.groups.iter().map(|group| group.name.as_str());
-                    let hint = hint(name, actions.chain(groups));
-                    let message = format!("`actions`: the space has no action or group `{name}`{hint}");
-                    return Err(SettingsError::Text(message));
-                }
-            }
-        }
-        let is_environment = |action: usize| {
-            !space.actions[action].effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)))
-        };
-        Ok(Rows {
-            allowed: table.rows().iter().map(|row| allowed[row.action]).collect(),
-            environment: table.rows().iter().map(|row| is_environment(row.action)).collect(),
-        })
-    }
-}
 
 /// Which of the two faces of a policy chooses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -127,7 +68,7 @@ impl QPolicy {
     /// # Errors
     /// If its settings cannot be read, or describe another network than it has.
     pub fn read(file: &Policy, table: &ActionTable) -> Result<QPolicy, SettingsError> {
-        let settings = LearnerSettings::from_record(&file.hyperparameters)?;
+        let settings = of_record(&file.hyperparameters)?;
         let rows = Rows::new(table, &settings.choice.actions)?;
         let shape = Shape { layers: file.layers.clone(), dueling: file.dueling };
         if shape != QPolicy::shape(&settings, rows.allowed.len()) {

@@ -9,7 +9,7 @@ use avastra_base::rng;
 use avastra_base::rng::Rng;
 use avastra_world::action::RowOdds;
 
-use super::registry::Agent;
+use super::acting::Agent;
 
 /// Draws among the legal rows by their odds, each as likely until it is told others. Actions with a rate come first: each in
 /// its part of the steps, shared by its legal rows; the rows with shares have what is left of a step.

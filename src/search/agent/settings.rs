@@ -1,23 +1,19 @@
-//! How the settings of an agent are read, checked and recorded. Each agent's own stand beside it.
+//! How the settings of an agent are read and recorded. Each agent's own stand beside it; `checked` says what may be wrong.
 
-use core::fmt::Display;
-use core::ops::Bound::{Excluded, Included};
-use core::ops::RangeBounds;
 use std::sync::Arc;
 
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
 use crate::mdp::{ProcKind, RewardSettings};
-use avastra_lang::syntax::{listed, nearest, settings_mistake, yaml_mistake};
+use avastra_lang::syntax::{listed, yaml_mistake};
 
+use super::checked::{SettingsError, changed, record};
+use super::choice::Rows;
 use super::learner::LearnerSettings;
 use super::presets::Preset;
-use super::q_policy::Rows;
 use super::registry::{Entry, Kind, REGISTRY};
 use super::search::{BanditSettings, ConstantSettings};
-use super::trainable::Trainable;
+use super::trainable::{Configured, Trainable};
 
 /// All settings of one agent. In a file, the names of the settings tell which kind of agent it is.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -26,41 +22,6 @@ pub enum Settings {
     Learning(Box<LearnerSettings>),
     Constant(ConstantSettings),
     Bandit(BanditSettings),
-}
-
-/// What the settings of every agent can do.
-pub(super) trait Configured: Serialize + DeserializeOwned {
-    type Trained: Trainable;
-
-    /// # Errors
-    /// If a value is out of range.
-    fn check(&self) -> Result<(), SettingsError>;
-
-    /// An agent that knows nothing yet.
-    fn build(&self, rows: Arc<Rows>, seed: u64) -> Self::Trained;
-
-    /// The agent that was saved; `None` if the bytes are not those of an agent with such settings and rows.
-    fn restore(&self, rows: Arc<Rows>, bytes: &[u8]) -> Option<Self::Trained>;
-}
-
-/// Why settings are refused.
-#[derive(Debug, thiserror::Error)]
-pub enum SettingsError {
-    #[error("{0}")]
-    Text(String),
-    #[error("no preset `{name}` for this agent: it has {known}")]
-    Preset { name: String, known: String },
-    #[error("no setting `{name}`{hint}")]
-    Unknown { name: String, hint: String },
-    #[error("this agent has no setting `{name}`: it is one of {owners}")]
-    Elsewhere { name: String, owners: String },
-    #[error("`{name}` is {value}, but must be {wanted}")]
-    Range { name: &'static str, value: String, wanted: &'static str },
-}
-
-/// The one of some names that is most like an unknown one, as the end of a message; empty if none is.
-pub(super) fn hint<'a>(unknown: &str, names: impl IntoIterator<Item = &'a str>) -> String {
-    nearest(unknown, names).map_or(String::new(), |name| format!(": did you mean `{name}`?"))
 }
 
 /// Does the same with the settings of whichever agent they are of.
@@ -94,6 +55,7 @@ impl Settings {
             (Kind::Searching(_), Some(name)) => Some(no_presets(name)),
             (Kind::Searching(read), None) => Some(lines(text).and_then(read)),
         }
+        .map(|read| read.map_err(elsewhere))
     }
 
     /// An agent that knows nothing yet.
@@ -163,84 +125,19 @@ fn lines(text: &str) -> Result<Map<String, Value>, SettingsError> {
     }
 }
 
-/// Settings with changes by name, checked.
-pub(super) fn changed<T: Configured>(base: &T, changes: Map<String, Value>) -> Result<T, SettingsError> {
-    let read = |record| {
-        serde_json::from_value::<T>(Value::Object(record))
-            .map_err(|error| settings_mistake(&error.to_string(), None))
+/// Of a name that is no setting of an agent: which agents have it, if there are any.
+fn elsewhere(error: SettingsError) -> SettingsError {
+    let SettingsError::Unknown { name, hint } = error else { return error };
+    let default = |entry: &Entry| match &entry.kind {
+        Kind::Ready(_) | Kind::OneRow(_) => None,
+        Kind::Learning(presets) => Some(Settings::Learning(Box::new((presets[0].settings)()))),
+        Kind::Searching(read) => read(Map::new()).ok(),
     };
-    let mut whole = record(base);
-    for (name, value) in changes {
-        if !whole.contains_key(&name) {
-            return Err(no_setting(name, &whole));
-        }
-        // Each change is tried alone, so that an error names the setting that is wrong.
-        let mut alone = record(base);
-        alone.insert(name.clone(), value.clone());
-        read(alone).map_err(|mistake| SettingsError::Text(format!("`{name}`: {mistake}")))?;
-        whole.insert(name, value);
-    }
-    let settings = read(whole).map_err(SettingsError::Text)?;
-    settings.check()?;
-    Ok(settings)
-}
-
-/// Every setting by name.
-pub(super) fn record(settings: &impl Serialize) -> Map<String, Value> {
-    match serde_json::to_value(settings).expect("settings are plain data") {
-        Value::Object(record) => record,
-        _ => unreachable!("a struct is an object"),
-    }
-}
-
-/// A name that is not among the settings of an agent: those agents that have it, or else a name that is like it.
-fn no_setting(name: String, own: &Map<String, Value>) -> SettingsError {
-    let default = |entry: &Entry| Settings::from_yaml(entry, None, "").and_then(Result::ok);
     let has_it = |entry: &&Entry| default(entry).is_some_and(|other| record(&other).contains_key(&name));
     let owners: Vec<&str> = REGISTRY.iter().filter(has_it).map(|entry| entry.name).collect();
-    if !owners.is_empty() {
-        return SettingsError::Elsewhere { name, owners: listed(&owners) };
-    }
-    let hint = hint(&name, own.keys().map(String::as_str));
-    SettingsError::Unknown { name, hint }
-}
-
-/// What a setting must be, and whether it is.
-pub(super) struct Requirement {
-    pub name: &'static str,
-    pub is_met: bool,
-    pub value: String,
-    pub wanted: &'static str,
-}
-
-/// The requirement that a value lies in a range; `wanted` is the range in words.
-pub(super) fn within<T: PartialOrd + Display>(
-    name: &'static str,
-    value: T,
-    range: impl RangeBounds<T>,
-    wanted: &'static str,
-) -> Requirement {
-    Requirement { name, is_met: range.contains(&value), value: value.to_string(), wanted }
-}
-
-/// The requirement that a value is a share or a probability.
-pub(super) fn unit(name: &'static str, value: f64) -> Requirement {
-    within(name, value, 0.0..=1.0, "from 0 to 1")
-}
-
-pub(super) fn positive(name: &'static str, value: f64) -> Requirement {
-    within(name, value, (Excluded(0.0), Included(1e6)), "above 0, and at most 1e6")
-}
-
-pub(super) fn count(name: &'static str, value: u64, most: u64) -> Requirement {
-    within(name, value, 1..=most, "a whole number from 1, and not enormous")
-}
-
-/// Refuses settings by the first requirement that is not met.
-pub(super) fn require(requirements: impl IntoIterator<Item = Requirement>) -> Result<(), SettingsError> {
-    match requirements.into_iter().find(|requirement| !requirement.is_met) {
-        Some(Requirement { name, value, wanted, .. }) => Err(SettingsError::Range { name, value, wanted }),
-        None => Ok(()),
+    match owners.is_empty() {
+        true => SettingsError::Unknown { name, hint },
+        false => SettingsError::Elsewhere { name, owners: listed(&owners) },
     }
 }
 

@@ -9,9 +9,9 @@ use crate::mdp::Observation;
 use avastra_base::rng;
 use avastra_base::rng::Rng;
 
+use super::acting::Agent;
 use super::q_policy::{QPolicy, best};
 use super::random::any;
-use super::registry::Agent;
 
 /// States that it is shown: those of the last choices in training, when the rate of random choices has fallen.
 pub(super) const STATES: usize = 1000;

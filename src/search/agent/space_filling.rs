@@ -11,7 +11,7 @@ use crate::mdp::Observation;
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 
-use super::registry::Agent;
+use super::acting::Agent;
 
 /// Steps of one hypercube: about as many as an episode has.
 const STEPS: usize = 10;

@@ -1,9 +1,13 @@
 //! What learners and searches have in common: they get better from episode to episode.
 
+use std::sync::Arc;
+
 use avastra_base::rng::Rng;
 
+use super::acting::Agent;
+use super::checked::Checked;
+use super::choice::Rows;
 use super::q_policy::QPolicy;
-use super::registry::Agent;
 use super::trajectory::{Lesson, Trajectory};
 
 /// A network's values are no numbers any more.
@@ -48,4 +52,15 @@ pub trait Trainable: Agent {
 
     /// The whole agent as bytes; see [`super::Settings::restore`].
     fn save(&self) -> Vec<u8>;
+}
+
+/// What the settings of every agent can do.
+pub(super) trait Configured: Checked {
+    type Trained: Trainable;
+
+    /// An agent that knows nothing yet.
+    fn build(&self, rows: Arc<Rows>, seed: u64) -> Self::Trained;
+
+    /// The agent that was saved; `None` if the bytes are not those of an agent with such settings and rows.
+    fn restore(&self, rows: Arc<Rows>, bytes: &[u8]) -> Option<Self::Trained>;
 }

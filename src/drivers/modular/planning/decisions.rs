@@ -97,8 +97,8 @@ impl Claim {
 mod tests {
     use super::*;
     use crate::kit::Guide;
-    use crate::modular::planning::trajectory::Point;
     use crate::modular::planning::claim::testing::crosser;
+    use crate::modular::planning::trajectory::Point;
     use crate::testing::straight;
 
     /// What is decided at 10 m/s, cycle after cycle, about a car that will be on the way 8 m ahead between two

@@ -12,8 +12,8 @@ use crate::status::Reason;
 use avastra_world::sim::{Scene, SignalColour, VehicleParameters};
 
 use super::super::config::PlanningConfig;
-use super::kept_clear::can_stop;
 use super::HORIZON_M;
+use super::kept_clear::can_stop;
 use super::speed::Constraint;
 use super::stages::{STOPPED_M, STOPPED_MPS};
 use super::trajectory::Point;

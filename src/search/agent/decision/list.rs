@@ -4,7 +4,7 @@
 //! a list of rows, because the variables do not tell which rows are legal: first the row that most of the
 //! stake wants, then the row that most of the stake wants where the first is not open, and so on.
 
-use crate::agent::settings::{SettingsError, require, within};
+use crate::agent::checked::{SettingsError, require, within};
 use crate::mdp::Observation;
 use avastra_lang::model::expr::Comparison;
 use avastra_lang::model::policy::{Condition, PolicyRule, variable_index};

@@ -4,26 +4,26 @@
 //! they leave open. `presets` has the values. A file has all settings in one list, by the names of the fields, and a
 //! policy file records the whole of it.
 
-use std::sync::Arc;
-
 use serde_json::{Map, Value};
 
+use crate::agent::checked::{Checked, SettingsError, count, positive, record, require, unit, within};
+use crate::agent::choice::ChoiceSettings;
 use crate::agent::decision::RulesSettings;
 use crate::agent::exploration::ExplorationSettings;
-use crate::agent::network::{Adam, Network, NetworkSettings};
+use crate::agent::network::NetworkSettings;
 use crate::agent::payment::PaymentSettings;
-use crate::agent::presets;
-use crate::agent::q_policy::{ChoiceSettings, QPolicy, Rows};
-use crate::agent::replay::{Replay, ReplaySettings};
-use crate::agent::settings::{
-    Configured, SettingsError, changed, count, positive, record, require, unit, within,
-};
-use avastra_base::rng;
-use avastra_base::rng::Stream;
+use crate::agent::replay::ReplaySettings;
 
-use super::{Learner, Loss};
+/// How a TD error becomes a loss.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Loss {
+    Squared,
+    /// Squared within 1, linear beyond.
+    Huber,
+}
 
-/// Settings of [`Learner`]. Presets give the values; there is no other default.
+/// Settings of [`super::Learner`]. Presets give the values; there is no other default.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LearnerSettings {
@@ -74,27 +74,13 @@ pub struct LearnerSettings {
 }
 
 impl LearnerSettings {
-    /// Settings as a policy file records them.
-    ///
-    /// # Errors
-    /// An unknown setting, a value of the wrong kind or out of range, and if one is missing.
-    pub fn from_record(recorded: &Map<String, Value>) -> Result<LearnerSettings, SettingsError> {
-        let base = presets::paper();
-        if let Some(missing) = base.record().keys().find(|name| !recorded.contains_key(*name)) {
-            return Err(SettingsError::Text(format!("the setting `{missing}` is missing")));
-        }
-        changed(&base, recorded.clone())
-    }
-
     /// Every setting by name.
     pub fn record(&self) -> Map<String, Value> {
         record(self)
     }
 }
 
-impl Configured for LearnerSettings {
-    type Trained = Learner;
-
+impl Checked for LearnerSettings {
     fn check(&self) -> Result<(), SettingsError> {
         self.payment.check()?;
         self.network.check()?;
@@ -118,26 +104,13 @@ impl Configured for LearnerSettings {
         ])?;
         require(self.gradient_norm_max.map(|length| positive("gradient_norm_max", length)))
     }
-
-    /// The learner with its parts; the first weights come from the seed.
-    fn build(&self, rows: Arc<Rows>, seed: u64) -> Learner {
-        let shape = QPolicy::shape(self, rows.allowed.len());
-        let mut rng = rng::stream(seed, Stream::Initialization, 0);
-        let network = Network::new(shape, self.network.initialization, &mut rng);
-        let adam = Adam::new(network.parameters().len(), self.learning_rate);
-        let policy = QPolicy::new(Arc::new(self.clone()), rows, network);
-        Learner::new(policy, Replay::new(self.replay), adam, self.exploration)
-    }
-
-    fn restore(&self, rows: Arc<Rows>, bytes: &[u8]) -> Option<Learner> {
-        self.build(rows, 0).restored(bytes)
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::agent::network::Initialization;
+    use crate::agent::presets;
     use crate::agent::presets::{DDQN, DEEP_COLLISION};
     use crate::agent::{Settings, by_name};
 
@@ -153,7 +126,7 @@ mod tests {
         for preset in DDQN.iter().chain(DEEP_COLLISION) {
             let settings = (preset.settings)();
             assert_eq!(settings.preset, preset.name);
-            assert_eq!(LearnerSettings::from_record(&settings.record()).unwrap(), settings);
+            assert_eq!(presets::of_record(&settings.record()).unwrap(), settings);
         }
     }
 
@@ -174,9 +147,9 @@ mod tests {
     fn a_record_has_every_setting() {
         let now = ddqn(None, "exploration_share: null");
         let mut record = now.record();
-        assert_eq!(LearnerSettings::from_record(&record).unwrap(), now);
+        assert_eq!(presets::of_record(&record).unwrap(), now);
         record.remove("discount");
-        assert!(LearnerSettings::from_record(&record).unwrap_err().to_string().contains("`discount`"));
+        assert!(presets::of_record(&record).unwrap_err().to_string().contains("`discount`"));
     }
 
     #[test]

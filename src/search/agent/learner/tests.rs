@@ -4,7 +4,7 @@ use ndarray::{Array1, Array2, array};
 
 use std::sync::Arc;
 
-use crate::agent::settings::Configured;
+use crate::agent::trainable::Configured;
 use crate::agent::trajectory::Experience;
 use crate::agent::{Rows, Settings, by_name};
 use avastra_base::rng::{Stream, stream};

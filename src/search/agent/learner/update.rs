@@ -6,16 +6,7 @@ use crate::agent::network::{Adam, Network};
 use crate::agent::q_policy::best;
 use crate::agent::replay::Transition;
 
-use super::LearnerSettings;
-
-/// How a TD error becomes a loss.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Loss {
-    Squared,
-    /// Squared within 1, linear beyond.
-    Huber,
-}
+use super::settings::{LearnerSettings, Loss};
 
 /// One update of the online network on a batch: its loss, and the TD errors, shape `(batch,)`.
 ///

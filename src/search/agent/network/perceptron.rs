@@ -8,7 +8,7 @@
 
 use ndarray::{Array2, ArrayView1, ArrayView2, Axis, s};
 
-use crate::agent::settings::{Requirement, SettingsError, require, within};
+use crate::agent::checked::{Requirement, SettingsError, require, within};
 use avastra_base::rng;
 use avastra_base::rng::Rng;
 

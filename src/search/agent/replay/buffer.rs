@@ -1,7 +1,7 @@
 //! Proportional prioritised replay (Schaul et al., 2016), and with exponent 0 the plain kind.
 
+use crate::agent::checked::{SettingsError, count, positive, require, unit};
 use crate::agent::checkpoint::{Reader, Writer};
-use crate::agent::settings::{SettingsError, count, positive, require, unit};
 use avastra_base::rng;
 use avastra_base::rng::Rng;
 

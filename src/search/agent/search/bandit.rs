@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use ndarray::ArrayView1;
 
-use crate::agent::q_policy::Rows;
+use crate::agent::acting::Agent;
+use crate::agent::checked::{Checked, SettingsError, positive, require, unit, within};
+use crate::agent::choice::Rows;
 use crate::agent::random::any;
-use crate::agent::registry::Agent;
-use crate::agent::settings::{Configured, SettingsError, positive, require, unit, within};
-use crate::agent::trainable::{Diverged, Trainable};
+use crate::agent::trainable::{Configured, Diverged, Trainable};
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use avastra_base::rng;
@@ -48,9 +48,7 @@ impl Default for BanditSettings {
     }
 }
 
-impl Configured for BanditSettings {
-    type Trained = Bandit;
-
+impl Checked for BanditSettings {
     fn check(&self) -> Result<(), SettingsError> {
         require([
             unit("record_share", self.record_share),
@@ -60,6 +58,10 @@ impl Configured for BanditSettings {
             positive("prior_choices", self.prior_choices),
         ])
     }
+}
+
+impl Configured for BanditSettings {
+    type Trained = Bandit;
 
     fn build(&self, rows: Arc<Rows>, _: u64) -> Bandit {
         Bandit::new(self, rows.allowed.len())

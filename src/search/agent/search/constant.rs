@@ -9,10 +9,10 @@ use std::sync::Arc;
 
 use ndarray::ArrayView1;
 
-use crate::agent::q_policy::Rows;
-use crate::agent::registry::Agent;
-use crate::agent::settings::{Configured, SettingsError, positive, require, within};
-use crate::agent::trainable::{Diverged, Trainable};
+use crate::agent::acting::Agent;
+use crate::agent::checked::{Checked, SettingsError, positive, require, within};
+use crate::agent::choice::Rows;
+use crate::agent::trainable::{Configured, Diverged, Trainable};
 use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use avastra_base::rng;
@@ -37,15 +37,17 @@ impl Default for ConstantSettings {
     }
 }
 
-impl Configured for ConstantSettings {
-    type Trained = Constant;
-
+impl Checked for ConstantSettings {
     fn check(&self) -> Result<(), SettingsError> {
         require([
             within("doubt", self.doubt, 0.0..=100.0, "from 0 to 100"),
             positive("prior_episodes", self.prior_episodes),
         ])
     }
+}
+
+impl Configured for ConstantSettings {
+    type Trained = Constant;
 
     fn build(&self, rows: Arc<Rows>, _: u64) -> Constant {
         Constant::new(self, rows.allowed.len())
