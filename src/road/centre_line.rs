@@ -4,7 +4,7 @@ use core::cell::Cell;
 
 use avastra_base::geometry::{Path, Vec2, unit_vector, wrap_angle};
 
-use super::conflict::segment_crossing;
+use super::crossing::segment_crossing;
 use super::opendrive::{Across, RoadElement, SectionElement};
 
 /// Largest distance of a chord from the curve, m; other modules rely on twice as much.

@@ -6,7 +6,7 @@
 
 use avastra_base::geometry::{OrientedBox, Vec2};
 
-use super::conflict::{edges, holds};
+use super::crossing::{edges, holds};
 use super::map::{RoadMap, Strip, StripKind};
 
 /// The least free width on which a person can stand between lanes, m: AASHTO's narrowest refuge island, 6 feet.

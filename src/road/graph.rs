@@ -16,10 +16,20 @@ use super::map::{
     Junction, Lane, LaneIndex, LaneKey, LeftOut, Neighbour, Precedence, RoadError, RoadMap, Strip, Turn,
 };
 use super::opendrive::{
-    Contact, Document, JunctionElement, LaneElement, Limit, RoadElement, RoadLink, SectionElement, wrong,
+    Contact, Document, JunctionElement, LaneElement, Limit, RoadElement, RoadLink, SectionElement, read, wrong,
 };
 use super::phases::share_phases;
 use super::signals::{add_objects, add_signals, find_obstacles, set_precedence};
+
+impl RoadMap {
+    /// Reads an OpenDRIVE file (1.4 to 1.8).
+    ///
+    /// # Errors
+    /// What is wrong with the file and in which line of it.
+    pub fn from_opendrive(name: &str, text: &str) -> Result<RoadMap, RoadError> {
+        build(&read(name, text)?)
+    }
+}
 
 /// The limit of a road whose file states none, m/s: 50 km/h, usual in towns.
 pub const LIMIT_MPS_DEFAULT: f64 = 50.0 / 3.6;
@@ -638,21 +648,11 @@ struct End {
     contact: Contact,
 }
 
-/// Ends of linked lanes that are farther apart than this do not meet, m: a car would have to jump.
-const LOOSE_M: f64 = 0.5;
-
-/// How far two linked lanes are apart, m; `None` where they meet.
-pub(super) fn leap_m(lane: &Lane, next: &Lane) -> Option<f64> {
-    let end = lane.centre.pose_at(lane.centre.length_m()).position;
-    let apart_m = (next.centre.pose_at(0.0).position - end).norm();
-    (apart_m > LOOSE_M).then_some(apart_m)
-}
-
 /// Warns of linked lanes whose ends do not meet.
 fn loose_links(map: &RoadMap) -> Option<String> {
     let links =
         map.lanes.iter().flat_map(|lane| lane.successors.iter().map(move |next| (lane, map.lane(*next))));
-    let loose = links.filter_map(|(lane, next)| Some((leap_m(lane, next)?, lane, next)));
+    let loose = links.filter_map(|(lane, next)| Some((lane.leap_m(next)?, lane, next)));
     let loose: Vec<_> = loose.collect();
     let (apart_m, lane, next) = loose.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     let name = |lane: &Lane| format!("lane {} of road `{}`", lane.key.lane, lane.key.road);

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::conflict::crossings_within;
+use super::crossing::crossings_within;
 use super::map::{Lane, RoadMap};
 
 /// Surfaces farther apart than this lie on two levels, m. Ours: the highest body of the engine has 3.2 m, and the

@@ -5,7 +5,7 @@
 
 use avastra_base::geometry::{Pose, SMOOTH_STEP_BEND_MAX, Vec2, smooth_step, wrap_angle};
 
-use super::conflict::append;
+use super::crossing::append;
 use super::map::{Lane, LaneIndex, RoadMap, Side};
 use super::opendrive::{Across, MarkRule, RoadElement, SectionElement};
 

@@ -14,7 +14,7 @@
 
 mod abreast;
 mod centre_line;
-mod conflict;
+mod crossing;
 mod footway;
 mod graph;
 mod heights;

@@ -7,7 +7,9 @@ use avastra_base::geometry::{Bounds, OrientedBox, Path, Pose, Vec2, wrap_angle};
 
 use super::heights::Heights;
 use super::index::LaneGrid;
-use super::{graph, opendrive};
+
+/// Ends of linked lanes that are farther apart than this do not meet, m: a car would have to jump.
+const LOOSE_M: f64 = 0.5;
 
 /// Index of a lane in [`RoadMap::lanes`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -267,14 +269,6 @@ pub enum RoadError {
 }
 
 impl RoadMap {
-    /// Reads an OpenDRIVE file (1.4 to 1.8).
-    ///
-    /// # Errors
-    /// What is wrong with the file and in which line of it.
-    pub fn from_opendrive(name: &str, text: &str) -> Result<RoadMap, RoadError> {
-        graph::build(&opendrive::read(name, text)?)
-    }
-
     pub fn lane(&self, index: LaneIndex) -> &Lane {
         &self.lanes[index.0]
     }
@@ -442,6 +436,13 @@ const APPROACH_LANES_MAX: usize = 200;
 const MISFIT_RAD_PER_M: f64 = 0.1;
 
 impl Lane {
+    /// How far the next lane begins from where this one ends, m; `None` where they meet.
+    pub(super) fn leap_m(&self, next: &Lane) -> Option<f64> {
+        let end = self.centre.pose_at(self.centre.length_m()).position;
+        let apart_m = (next.centre.pose_at(0.0).position - end).norm();
+        (apart_m > LOOSE_M).then_some(apart_m)
+    }
+
     /// Whether its traffic runs in the direction of the road's reference line.
     pub fn is_along(&self) -> bool {
         self.road_stations_m[0] < self.road_stations_m[self.road_stations_m.len() - 1]

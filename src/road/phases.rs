@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use avastra_base::geometry::wrap_angle;
 
-use super::conflict::crossings;
+use super::crossing::crossings;
 use super::map::{LaneIndex, RoadMap, StopLine};
 
 /// Two ways whose beginnings differ by more than this come from opposite arms.

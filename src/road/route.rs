@@ -4,8 +4,7 @@ use std::collections::BTreeSet;
 
 use avastra_base::geometry::{Path, smooth_step, wrap_angle};
 
-use super::conflict::{conflicts, spans_inside};
-use super::graph::leap_m;
+use super::crossing::{crossings, merge, spans_inside};
 use super::heights::is_apart;
 use super::join::Joined;
 use super::lane_change::LENGTH_M_MIN;
@@ -209,7 +208,7 @@ impl Route {
         let pairs = self.lanes.windows(2).map(|pair| (pair[0].lane, pair[1].lane));
         let linked = pairs.filter(|(lane, next)| map.lane(*lane).successors.contains(next));
         let leaps =
-            linked.filter_map(|(lane, next)| Some((leap_m(map.lane(lane), map.lane(next))?, lane, next)));
+            linked.filter_map(|(lane, next)| Some((map.lane(lane).leap_m(map.lane(next))?, lane, next)));
         leaps.max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
@@ -311,4 +310,49 @@ fn straightest_successor(map: &RoadMap, lane: LaneIndex) -> Option<LaneIndex> {
     };
     let successors = &map.lane(lane).successors;
     successors.iter().copied().min_by(|a, b| turn_rad(a).total_cmp(&turn_rad(b)))
+}
+
+/// All conflicts of a route, by rising station.
+fn conflicts(map: &RoadMap, lanes: &[RouteLane], path: &Path) -> Vec<Conflict> {
+    let mut all = Vec::new();
+    for (i, here) in lanes.iter().enumerate() {
+        let Some(junction) = map.lane(here.lane).junction else { continue };
+        let Some(inside) = path.part(here.from_m, here.to_m) else { continue };
+        let begin_m = here.from_m.max(0.0);
+        let next = lanes.get(i + 1).map(|next| next.lane);
+        for other in map.junctions[junction].lanes.iter().copied() {
+            let on_route = lanes.iter().any(|lane| lane.lane == other);
+            if on_route || diverges(map, here.lane, other) {
+                continue;
+            }
+            let joins = next.is_some_and(|next| map.lane(other).successors.contains(&next));
+            let found = if joins {
+                merge(&inside, &map.lane(other).centre).into_iter().collect()
+            } else {
+                crossings(&inside, &map.lane(other).centre)
+            };
+            let passes_over = |(station_m, lane_station_m): &(f64, f64)| {
+                let on_lane_m = station_m + begin_m - here.from_m;
+                map.lane(here.lane).is_apart_at(on_lane_m, map.lane(other), *lane_station_m)
+            };
+            let meet = found.into_iter().filter(|stations_m| !passes_over(stations_m));
+            all.extend(meet.map(|(station_m, lane_station_m)| Conflict {
+                station_m: station_m + begin_m,
+                lane: other,
+                lane_station_m,
+                angle_rad: wrap_angle(
+                    map.lane(other).centre.pose_at(lane_station_m).heading_rad
+                        - inside.pose_at(station_m).heading_rad,
+                ),
+            }));
+        }
+    }
+    all.sort_by(|a, b| a.station_m.total_cmp(&b.station_m).then(a.lane.cmp(&b.lane)));
+    all
+}
+
+/// Whether two lanes begin at the end of the same lane. A vehicle on the other one then comes from behind the
+/// ego vehicle or drives ahead of it, and is no crossing traffic.
+fn diverges(map: &RoadMap, here: LaneIndex, other: LaneIndex) -> bool {
+    map.lane(other).predecessors.iter().any(|from| map.lane(here).predecessors.contains(from))
 }

@@ -1,9 +1,6 @@
-//! Where other lanes cross or join a route inside junctions, and where it meets crosswalks.
+//! Where two paths cross or join, and where a path is inside an outline.
 
-use avastra_base::geometry::{Bounds, Path, PathPoint, Vec2, wrap_angle};
-
-use super::map::{LaneIndex, RoadMap};
-use super::route::{Conflict, RouteLane};
+use avastra_base::geometry::{Bounds, Path, PathPoint, Vec2};
 
 /// A lane that joins the route does so where the centre lines have come this near, m.
 const MERGE_M: f64 = 1.5;
@@ -11,53 +8,8 @@ const MERGE_M: f64 = 1.5;
 /// Two crossings of one lane nearer than this are one, m.
 const SAME_CROSSING_M: f64 = 1.0;
 
-/// All conflicts of a route, by rising station.
-pub fn conflicts(map: &RoadMap, lanes: &[RouteLane], path: &Path) -> Vec<Conflict> {
-    let mut all = Vec::new();
-    for (i, here) in lanes.iter().enumerate() {
-        let Some(junction) = map.lane(here.lane).junction else { continue };
-        let Some(inside) = path.part(here.from_m, here.to_m) else { continue };
-        let begin_m = here.from_m.max(0.0);
-        let next = lanes.get(i + 1).map(|next| next.lane);
-        for other in map.junctions[junction].lanes.iter().copied() {
-            let on_route = lanes.iter().any(|lane| lane.lane == other);
-            if on_route || diverges(map, here.lane, other) {
-                continue;
-            }
-            let joins = next.is_some_and(|next| map.lane(other).successors.contains(&next));
-            let found = if joins {
-                merge(&inside, &map.lane(other).centre).into_iter().collect()
-            } else {
-                crossings(&inside, &map.lane(other).centre)
-            };
-            let passes_over = |(station_m, lane_station_m): &(f64, f64)| {
-                let on_lane_m = station_m + begin_m - here.from_m;
-                map.lane(here.lane).is_apart_at(on_lane_m, map.lane(other), *lane_station_m)
-            };
-            let meet = found.into_iter().filter(|stations_m| !passes_over(stations_m));
-            all.extend(meet.map(|(station_m, lane_station_m)| Conflict {
-                station_m: station_m + begin_m,
-                lane: other,
-                lane_station_m,
-                angle_rad: wrap_angle(
-                    map.lane(other).centre.pose_at(lane_station_m).heading_rad
-                        - inside.pose_at(station_m).heading_rad,
-                ),
-            }));
-        }
-    }
-    all.sort_by(|a, b| a.station_m.total_cmp(&b.station_m).then(a.lane.cmp(&b.lane)));
-    all
-}
-
-/// Whether two lanes begin at the end of the same lane. A vehicle on the other one then comes from behind the
-/// ego vehicle or drives ahead of it, and is no crossing traffic.
-fn diverges(map: &RoadMap, here: LaneIndex, other: LaneIndex) -> bool {
-    map.lane(other).predecessors.iter().any(|from| map.lane(here).predecessors.contains(from))
-}
-
 /// Where a lane comes within [`MERGE_M`] of the route and stays there: (station on the route, on the lane), m.
-fn merge(route: &Path, lane: &Path) -> Option<(f64, f64)> {
+pub fn merge(route: &Path, lane: &Path) -> Option<(f64, f64)> {
     let near = |point: &PathPoint| (route.project(point.position), point.station_m);
     let mut first = None;
     for (projection, lane_station_m) in dense(lane).iter().map(near).rev() {
