@@ -16,7 +16,8 @@ use super::map::{
     Junction, Lane, LaneIndex, LaneKey, LeftOut, Neighbour, Precedence, RoadError, RoadMap, Strip, Turn,
 };
 use super::opendrive::{
-    Contact, Document, JunctionElement, LaneElement, Limit, RoadElement, RoadLink, SectionElement, read, wrong,
+    Contact, Document, JunctionElement, LaneElement, Limit, RoadElement, RoadLink, SectionElement, read,
+    wrong,
 };
 use super::phases::share_phases;
 use super::signals::{add_objects, add_signals, find_obstacles, set_precedence};

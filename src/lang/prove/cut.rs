@@ -3,7 +3,7 @@
 use crate::model::expr::Comparison;
 use crate::model::rules::RowRules;
 use crate::model::{Domain, End, Interval, Parameter, RulesInForce, Space, code, effort};
-use crate::prove::{OpenRow, open_rows, rule_names};
+use crate::prove::lists::{OpenRow, open_rows, rule_names};
 use crate::syntax::{Diagnostic, listed};
 use avastra_base::units::Rational;
 

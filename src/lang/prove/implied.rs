@@ -4,8 +4,8 @@ use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Demand, RowRules};
 use crate::model::{Road, Row, RuleBody, RulesInForce, Space, code, effort};
 use crate::prove::enclose::{Known, Values, enclose};
+use crate::prove::lists::{distinct, rule_names};
 use crate::prove::moment::always_holds;
-use crate::prove::{distinct, rule_names};
 use crate::syntax::{Diagnostic, listed};
 
 /// Limit on rows times rules for the whole report; rules beyond it are not looked at.

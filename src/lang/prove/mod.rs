@@ -16,6 +16,7 @@ mod cut;
 mod enclose;
 mod implied;
 mod kept;
+mod lists;
 mod moment;
 mod never_drawn;
 mod reach;
@@ -41,52 +42,8 @@ pub(crate) use spawn_bounds::odds_out_of_bounds;
 pub use time::{BrokenByTime, lasts};
 pub use witness::{Witness, witness};
 
-use std::sync::Arc;
-
-use crate::model::{Interval, Road, Row, Space, effort};
-use crate::syntax::{Diagnostic, listed};
-
-/// A row on a road where it may run, with the ranges that rules leave to its numbers.
-struct OpenRow<'a> {
-    row: &'a Row,
-    road: &'a Road,
-    ranges: &'a [(Arc<str>, Interval)],
-}
-
-/// These rows on each road where they may run.
-fn open_rows<'a>(space: &'a Space, rows: &'a [Row]) -> impl Iterator<Item = OpenRow<'a>> {
-    let all = rows.iter().flat_map(move |row| space.roads.iter().zip(&row.roads).map(move |on| (row, on)));
-    all.filter_map(|(row, (road, reach))| Some(OpenRow { row, road, ranges: reach.ranges()? }))
-}
-
-/// The names of rules, as a list in words.
-fn rule_names(space: &Space, rules: &[usize]) -> String {
-    listed(&rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect::<Vec<_>>())
-}
-
-/// The different ones among these, in their order.
-fn distinct<T: PartialEq>(all: impl IntoIterator<Item = T>) -> Vec<T> {
-    let mut found = Vec::new();
-    for one in all {
-        if !found.contains(&one) {
-            found.push(one);
-        }
-    }
-    found
-}
-
-/// Each of these again with each of the values, which vary fastest; `put` puts a value in.
-fn product<T: Clone, V: Copy>(all: &[T], values: &[V], put: impl Fn(&mut T, V)) -> Vec<T> {
-    let mut longer = Vec::with_capacity(all.len() * values.len());
-    for one in all {
-        for value in values {
-            let mut one = one.clone();
-            put(&mut one, *value);
-            longer.push(one);
-        }
-    }
-    longer
-}
+use crate::model::{Space, effort};
+use crate::syntax::Diagnostic;
 
 /// Errors, warnings and remarks about a space whose names and types are right.
 pub(crate) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {

@@ -5,8 +5,8 @@ use core::cell::Cell;
 use crate::model::rules::RowRules;
 use crate::model::{Domain, Parameter, RulesInForce, Space, Value, code};
 use crate::prove::enclose::Values;
+use crate::prove::lists::{OpenRow, distinct, open_rows, rule_names};
 use crate::prove::reach::declared;
-use crate::prove::{OpenRow, distinct, open_rows, rule_names};
 use crate::syntax::{Diagnostic, enumerated};
 
 /// A remark names this many values and one more; of longer lists the others are counted.

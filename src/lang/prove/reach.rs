@@ -15,8 +15,8 @@ use crate::model::{
     Type, Value, code, evaluate, locals,
 };
 use crate::prove::enclose::{Known, Values, enclose};
+use crate::prove::lists::{distinct, product, rule_names};
 use crate::prove::moment::{Case, may_hold_together, newcomers, ranges_named};
-use crate::prove::{distinct, product, rule_names};
 use crate::syntax::{Diagnostic, listed};
 use avastra_base::units::{Unit, unit_as_written};
 

@@ -11,10 +11,10 @@ use crate::model::rules::RowRules;
 use crate::model::vocabulary::Fact;
 use crate::model::{Memory, Reach, Road, Row, RulesInForce, Space, Value, effort};
 use crate::prove::enclose::Values;
+use crate::prove::lists::{product, rule_names};
 use crate::prove::moment::Case;
 use crate::prove::reach::declared;
 use crate::prove::witness::{Found, Left, Search, points};
-use crate::prove::{product, rule_names};
 
 /// The most boxes of ranges that the searches of all rows look at; most rows need one for each road.
 const BOXES_MAX: usize = 20_000;

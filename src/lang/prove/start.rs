@@ -1,7 +1,7 @@
 //! Rules under which no episode can begin.
 
 use crate::model::{Initial, NoStart, RulesInForce, Space, code, effort};
-use crate::prove::distinct;
+use crate::prove::lists::distinct;
 use crate::syntax::{Diagnostic, listed};
 
 /// One error for each rule that leaves no states to begin with on some roads; a road shows its first one alone. One

@@ -16,9 +16,9 @@ use crate::model::{
     code, effort,
 };
 use crate::prove::enclose::{Known, Values, bits, enclose};
+use crate::prove::lists::{distinct, product};
 use crate::prove::moment::Case;
 use crate::prove::reach::declared;
-use crate::prove::{distinct, product};
 use crate::syntax::{Diagnostic, listed};
 use avastra_base::units::Rational;
 

@@ -8,10 +8,11 @@ use crate::model::rules::RowRules;
 use crate::model::vocabulary::Known;
 use crate::model::{ActionDef, Row, RuleBody, RuleDef, RulesInForce, Space, code, effort};
 use crate::prove::clock::never_enabled;
+use crate::prove::lists::rule_names;
 use crate::prove::reach::numbers;
 use crate::prove::realise::{Realisable, Realised, is_about_time};
+use crate::prove::spawn_bounds;
 use crate::prove::witness::{Found, Left, Search};
-use crate::prove::{rule_names, spawn_bounds};
 use crate::syntax::{Diagnostic, listed};
 
 /// The most boxes of ranges that are looked at to find the rules which leave a row undecided.

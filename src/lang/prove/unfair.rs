@@ -9,8 +9,8 @@ use crate::model::vocabulary::{Known, LaneChoice, Verb, Word};
 use crate::model::{
     Facts, Memory, Road, Row, RulesInForce, Space, SpawnDef, Value, code, effort, evaluate, locals,
 };
+use crate::prove::lists::{OpenRow, open_rows};
 use crate::prove::witness::{Left, Search, Witness};
-use crate::prove::{OpenRow, open_rows};
 use crate::syntax::Diagnostic;
 use avastra_base::kinematics::{CAREFUL_BRAKING_MPS2, CAREFUL_DELAY_S, stopping_m};
 use avastra_base::units::{Dimension, quantity, quantity_in, unit_of_all};

@@ -22,10 +22,10 @@ use crate::model::{
     spawn_distance_m,
 };
 use crate::prove::enclose::{Known, Values};
+use crate::prove::lists::{distinct, product};
 use crate::prove::moment::{Case, may_hold_together, newcomers};
 use crate::prove::reach::declared;
 use crate::prove::sums::oppose;
-use crate::prove::{distinct, product};
 use avastra_base::units::Rational;
 
 /// The most boxes of ranges looked at for one choice of the listed values and one memory.

@@ -5,7 +5,9 @@ use avastra_road::{LanePlace, RoadMap};
 
 use super::super::vertices::Vertex;
 use super::super::xml::{Element, number};
-use super::Version;
+use super::style::{BENEATH_M, Version};
+use avastra_campaign::episode::Actor;
+use avastra_world::sim::DT_S;
 
 pub fn maneuver_group(name: &str, actor: Option<&str>, events: Vec<Element>) -> Element {
     let actors = Element::new("Actors")
@@ -262,4 +264,22 @@ pub fn route(name: &str, places: impl Iterator<Item = Element>) -> Element {
     let route =
         Element::new("Route").with("name", name).with("closed", false).holding_all(places.map(waypoint));
     private(Element::new("RoutingAction").holding(Element::new("AssignRouteAction").holding(route)))
+}
+
+/// A road user that leaves sinks out of sight in the tick after its last, and is deleted in the next: esmini prints an error
+/// where one that touches another is gone at once.
+pub fn leaves(end_tick: u64, actor: &Actor, version: Version) -> Vec<Element> {
+    let name = actor.name();
+    let last = actor.samples[actor.samples.len() - 1];
+    if last.tick >= end_tick {
+        return Vec::new();
+    }
+    let away = teleport(beneath(&last.pose, BENEATH_M));
+    let deleted = of_entity(&name, Element::new("DeleteEntityAction"));
+    let parts = [("leaves", "sinks", away), ("is_gone", "deleted", deleted)];
+    let event = |(ticks, (event, does, what)): (u64, (&str, &str, Element))| {
+        let from_s = (last.tick + ticks) as f64 * DT_S;
+        event_at(version, &format!("{name}_{event}"), vec![action(&format!("{name}_{does}"), what)], from_s)
+    };
+    (1..).zip(parts).map(event).collect()
 }

@@ -14,7 +14,8 @@ use super::super::xml::Element;
 use super::actions::private;
 use super::entity::{bounding_box, build, vehicle_category, without_wheels};
 use super::environment::{sun, time};
-use super::{BENEATH_M, natural, property};
+use super::natural;
+use super::style::{BENEATH_M, property};
 
 /// Above this it sees no fog, below nothing but fog, m.
 const FOG_M: f64 = 1000.0;

@@ -5,7 +5,7 @@ use avastra_lang::model::vocabulary::Body;
 use avastra_world::sim::VehicleParameters;
 
 use super::super::xml::Element;
-use super::{Ego, property};
+use super::style::{Ego, property};
 
 /// Diameter of a wheel, and how far the wheels of an axle are apart as a part of the width: usual values, which matter to
 /// a picture alone.

@@ -18,6 +18,7 @@ mod natural;
 mod pace;
 mod space;
 mod story;
+mod style;
 mod when;
 
 use avastra_campaign::episode::Actor;
@@ -30,53 +31,16 @@ use super::vertices::{close_ticks, vertices};
 use super::xml::Element;
 
 use actions::{
-    action, all, beneath, event_at, follow, from_time, lane_position, maneuver_group, of_entity, position,
+    action, all, event_at, follow, from_time, lane_position, leaves, maneuver_group, of_entity, position,
     private, speed, teleport,
 };
 use entity::{ahead_of_centre_m, entity};
 use environment::{environment, signals};
 use natural::Natural;
+use style::property;
 
 pub use space::{SPEED_LIMIT, SpaceFile, SpaceFiles, space};
-
-/// What must not be met is so far beneath its place, m.
-const BENEATH_M: f64 = 100.0;
-
-/// The standard's version.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Version {
-    V1_2,
-    /// 1.0, and of it what CARLA's ScenarioRunner reads; always natural, the ego vehicle too.
-    Carla,
-}
-
-/// What the file says of the ego vehicle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ego {
-    /// It drives as it was recorded.
-    Trajectory,
-    /// It has a controller named `ads`, which the player provides, and is told the goal.
-    Controller,
-    /// It stands at its start with its first speed; the player moves it or lets it roll.
-    None,
-}
-
-/// How the file says what others do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Others {
-    /// As recorded, tick by tick.
-    Exact,
-    /// By actions that a person would write, which come near to the recording.
-    Natural,
-}
-
-/// How a file is to be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Style {
-    pub version: Version,
-    pub ego: Ego,
-    pub others: Others,
-}
+pub use style::{Ego, Others, Style, Version};
 
 /// A file.
 pub struct Written {
@@ -139,11 +103,6 @@ fn file_header(version: Version, description: &str) -> Element {
         .with("date", format!("{DATE}T00:00:00"))
         .with("description", description)
         .with("author", "avastra")
-}
-
-/// A fact about the file.
-fn property(name: &str, value: &str) -> Element {
-    Element::new("Property").with("name", name).with("value", value)
 }
 
 fn storyboard(recording: &Recording, style: Style, exact: &[&Actor]) -> Element {
@@ -242,24 +201,6 @@ fn events(recording: &Recording, actor: &Actor, style: Style) -> Vec<Element> {
     }
     events.extend(leaves(recording.seen.end_tick, actor, style.version));
     events
-}
-
-/// A road user that leaves sinks out of sight in the tick after its last, and is deleted in the next: esmini prints an error
-/// where one that touches another is gone at once.
-fn leaves(end_tick: u64, actor: &Actor, version: Version) -> Vec<Element> {
-    let name = actor.name();
-    let last = actor.samples[actor.samples.len() - 1];
-    if last.tick >= end_tick {
-        return Vec::new();
-    }
-    let away = teleport(beneath(&last.pose, BENEATH_M));
-    let deleted = of_entity(&name, Element::new("DeleteEntityAction"));
-    let parts = [("leaves", "sinks", away), ("is_gone", "deleted", deleted)];
-    let event = |(ticks, (event, does, what)): (u64, (&str, &str, Element))| {
-        let from_s = (last.tick + ticks) as f64 * DT_S;
-        event_at(version, &format!("{name}_{event}"), vec![action(&format!("{name}_{does}"), what)], from_s)
-    };
-    (1..).zip(parts).map(event).collect()
 }
 
 /// Changes of weather and time of day after the start.

@@ -15,14 +15,14 @@ use avastra_world::sim::{DT_S, VehicleParameters};
 use super::super::recording::Recording;
 use super::super::xml::Element;
 use super::actions::{
-    action, after_event, beneath, change_lane, event, event_at, from_time, lane_position, of_entity,
+    action, after_event, beneath, change_lane, event, event_at, from_time, lane_position, leaves, of_entity,
     position, route, speed, speed_within, teleport, touched, walk, within,
 };
 use super::entity::ahead_of_centre_m;
 use super::lanes::{Driven, STRIDE, driven};
 use super::pace::{Change, Pace, SPEED_MPS, WAY_M};
 use super::story::{Cast, Newcomer};
-use super::{BENEATH_M, Version, leaves};
+use super::style::{BENEATH_M, Version};
 
 /// What moved less than this stands, m.
 const STANDS_M: f64 = 0.1;

@@ -17,12 +17,12 @@ use avastra_world::action::{Course, LaterMoment, SpawnRequest};
 use avastra_world::sim::ASIDE_MPS;
 
 use super::super::xml::Element;
-use super::Version;
 use super::actions::{
     action, by_entity, condition_after, event_is, event_of_groups, from_time, lane_position,
     lane_position_aside, position, private, route, speed, teleport, walk_from,
 };
 use super::entity::ahead_of_centre_m;
+use super::style::Version;
 use super::when;
 
 /// A way that keeps this near to the middle of lanes, m, and no more across them, rad, leads along them.
