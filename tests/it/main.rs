@@ -4,8 +4,8 @@
 mod agents;
 mod alarms;
 mod cases;
-mod circles;
 mod catalogue;
+mod circles;
 mod command;
 mod corpus;
 mod contacts;
