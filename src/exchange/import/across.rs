@@ -1,7 +1,7 @@
 //! Places across the road: other lanes, offsets in them, and how fast somebody moves there.
 
 use avastra_base::geometry::{SMOOTH_STEP_SLOPE_MAX, wrap_angle};
-use avastra_lang::model::command::OFFSET_M;
+use avastra_lang::model::OFFSET_M;
 use avastra_road::{Lane, LanePlace, Side};
 
 use super::action::{Dynamics, Over, Target};

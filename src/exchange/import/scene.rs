@@ -5,8 +5,8 @@ use std::rc::Rc;
 
 use avastra_base::geometry::{Path, Vec2, wrap_angle};
 use avastra_campaign::emit::lane_point;
+use avastra_lang::model::OFFSET_M;
 use avastra_lang::model::SPAWN_SPEED_MPS;
-use avastra_lang::model::command::OFFSET_M;
 use avastra_road::{LEVEL_SLOPE_MAX, LIMIT_MPS_DEFAULT, LanePlace, Route};
 use avastra_world::sim::VehicleParameters;
 

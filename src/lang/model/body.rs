@@ -16,6 +16,27 @@ pub struct OwnBody {
     pub shape: BodyParameters,
 }
 
+/// What a spawn calls a body: one of the engine, or one of the author's own that is like it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BodyWord {
+    pub like: Body,
+    /// Index in [`Space::bodies`](super::Space::bodies).
+    pub own: Option<usize>,
+}
+
+impl BodyWord {
+    /// A body of the engine.
+    pub const fn engine(like: Body) -> BodyWord {
+        BodyWord { like, own: None }
+    }
+
+    /// Whether this is what a body of that name means: one of the engine's names stands for the author's own that are
+    /// like it, too.
+    pub fn is(self, named: BodyWord) -> bool {
+        self.like == named.like && (named.own.is_none() || self.own == named.own)
+    }
+}
+
 /// What a body is and can do on a dry road.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodyParameters {

@@ -3,10 +3,10 @@
 
 use core::ops::RangeInclusive;
 
-use crate::model::eval::{Facts, evaluate};
-use crate::model::expr::{Expr, ExprKind, Who};
-use crate::model::limits::{EARLY_S, SPEED_MPS_MAX, out_of_bounds, rounded_into};
-use crate::model::space::{FnDef, WordExpr};
+use crate::model::eval::evaluate;
+use crate::model::expr::{Expr, ExprKind, FnDef, Who, WordExpr};
+use crate::model::facts::Facts;
+use crate::model::limits::{EARLY_S, OFFSET_M, SPEED_MPS_MAX, out_of_bounds, rounded_into};
 use crate::model::value::Type;
 use avastra_base::geometry::SMOOTH_STEP_SLOPE_MAX;
 use avastra_base::units::{Dimension, Rational};
@@ -149,9 +149,6 @@ impl Moves {
 
 /// Rates at which a vehicle may be told to change its speed, m/s². The most is more than tyres give.
 pub const RATE_MPS2: RangeInclusive<f64> = 0.1..=15.0;
-
-/// Places beside the middle of a lane, m to the left: two lanes and more, on either side.
-pub const OFFSET_M: RangeInclusive<f64> = -10.0..=10.0;
 
 /// Speeds to the side, m/s. UN R157's cut-ins reach 3 m/s; who follows a trajectory may run aside.
 const ASIDE_MPS: RangeInclusive<f64> = 0.1..=10.0;

@@ -2,12 +2,30 @@
 
 use core::ops::Range;
 
-use crate::model::space::BodyWord;
+use crate::model::body::BodyWord;
 use crate::model::value::{EnumIndex, Type, Value};
 use crate::model::vocabulary::{Fact, Known, LaneChoice, NearWord, NumberWord, PastWord, WordFact};
 use crate::syntax::ast::Span;
 pub use crate::syntax::ast::{Arithmetic, Comparison};
 use avastra_base::units::Rational;
+
+/// A pure function; its parameters are the locals of its body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FnDef {
+    pub name: String,
+    pub parameters: Vec<(String, Type)>,
+    pub result: Type,
+    pub body: Expr,
+    pub span: Span,
+}
+
+/// A word of the engine: fixed, or chosen by a value of one of the author's enums.
+#[derive(Debug, Clone, PartialEq)]
+pub enum WordExpr<W> {
+    Fixed(W),
+    /// The word for each variant of the expression's enum.
+    Of(Expr, Vec<W>),
+}
 
 /// Whom a fact is about, or an order is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

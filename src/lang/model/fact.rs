@@ -5,13 +5,13 @@
 
 use core::ops::RangeInclusive;
 
-use crate::model::eval::{
+use crate::model::facts::{
     CROSSWALK_GAP_M_MAX, Facts, JUNCTION_AHEAD_M_MAX, LEAD_GAP_M_MAX, MomentFacts, SINCE_S_MAX, TIME_S_MAX,
     TickFacts,
 };
 use crate::model::limits::{AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, SPEED_MPS_MAX};
 use crate::model::value::{Type, Value};
-use crate::model::vocabulary::{Known, Word, words};
+use crate::model::vocabulary::{Known, ROAD_LANES, Site, Word, WordFact, thing_of, words};
 use avastra_base::units::Dimension;
 
 /// What stands where a fact is found.
@@ -310,4 +310,56 @@ facts! {
         "A `Bool`: the ego vehicle did not have to give way, and the obstacle ran into its side or rear, or into any part of it while it stood.";
     Avoidable "avoidable" Type::Bool, Judgement, outcome.avoidable =
         "A `Bool`: a careful reference driver avoids it. Verdicts only.";
+}
+
+/// The names with a `.`, each with its sentence.
+fn dotted() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let facts = Fact::ALL.iter().map(|fact| (fact.name(), fact.meaning()));
+    let words = WordFact::ALL.iter().map(|fact| (fact.name(), fact.meaning()));
+    facts.chain([ROAD_LANES]).chain(words).filter(|(name, _)| name.contains('.'))
+}
+
+/// The things that have facts: the words before a `.`.
+pub fn things() -> Vec<&'static str> {
+    let mut things: Vec<&str> = Vec::new();
+    for thing in dotted().filter_map(|(name, _)| thing_of(name)) {
+        if !things.contains(&thing) {
+            things.push(thing);
+        }
+    }
+    things
+}
+
+/// The facts of a thing (`road`): the words after its `.`, each with its sentence.
+pub fn parts_of(thing: &str) -> Vec<(&'static str, &'static str)> {
+    let parts = dotted().filter_map(|(name, meaning)| Some((name.split_once('.')?, meaning)));
+    parts.filter(|((of, _), _)| *of == thing).map(|((_, part), meaning)| (part, meaning)).collect()
+}
+
+/// The facts of a road user that is named, or told by its number, each with its sentence: without those that are watched of each
+/// one near alone.
+pub fn parts_of_named() -> Vec<(&'static str, &'static str)> {
+    let is_watched =
+        |part: &str| Fact::from_name(&format!("npc.{part}")).is_some_and(|fact| fact.known() == Known::Near);
+    parts_of("npc").into_iter().filter(|(part, _)| !is_watched(part)).collect()
+}
+
+impl Site {
+    /// Whether a fact is known here. What a spawn asks for is known at the draw alone.
+    pub fn knows_fact(self, fact: Fact) -> bool {
+        let is_of_spawn = matches!(fact, Fact::SpawnGap | Fact::SafetyGap);
+        self.knows(fact.known())
+            && !(is_of_spawn && matches!(self, Site::Change | Site::Phase | Site::RequirementOn))
+    }
+
+    /// The facts that are known here.
+    pub fn facts(self) -> impl Iterator<Item = Fact> {
+        Fact::ALL.iter().copied().filter(move |fact| self.knows_fact(*fact))
+    }
+
+    /// Whether anything can be asked of a thing (`road`) here.
+    pub fn knows_thing(self, thing: &str) -> bool {
+        self.facts().any(|fact| thing_of(fact.name()) == Some(thing))
+            || self.word_facts().any(|fact| thing_of(fact.name()) == Some(thing))
+    }
 }

@@ -4,11 +4,10 @@
 
 use core::ops::RangeInclusive;
 
-use crate::model::command::OFFSET_M;
-use crate::model::eval::compare;
-use crate::model::expr::Comparison;
+use crate::model::numbers::compare;
 use crate::model::value::Value;
 use crate::model::vocabulary::Verb;
+use crate::syntax::ast::Comparison;
 
 /// The tick of physics, ms: an observation period is a whole number of ticks.
 pub const TICK_MS: u32 = 20;
@@ -36,6 +35,9 @@ pub fn spawn_distance_m(verb: Verb) -> RangeInclusive<f64> {
     let least_m = if verb == Verb::DriveAhead { BESIDE_M } else { *SPAWN_DISTANCE_M.start() };
     least_m..=*SPAWN_DISTANCE_M.end()
 }
+
+/// Places beside the middle of a lane, m to the left: two lanes and more, on either side.
+pub const OFFSET_M: RangeInclusive<f64> = -10.0..=10.0;
 
 /// Parts of the ego vehicle's front at which somebody may be met.
 pub const MEET: RangeInclusive<f64> = 0.0..=1.0;

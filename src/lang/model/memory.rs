@@ -3,12 +3,12 @@
 use std::collections::BTreeSet;
 
 use crate::model::effort;
-use crate::model::eval::{Facts, WorldFacts, evaluate};
+use crate::model::eval::evaluate;
 use crate::model::expr::{Expr, ExprKind};
+use crate::model::facts::RoadFacts;
+use crate::model::facts::{Facts, WorldFacts};
 use crate::model::rules::{Combinations, RulesInForce, cells_read};
-use crate::model::space::{
-    Initial, Road, RoadFacts, RuleBody, RuleDef, SetDef, Space, StateDef, StateMeaning,
-};
+use crate::model::space::{Initial, Road, RuleBody, RuleDef, SetDef, Space, StateDef, StateMeaning};
 use crate::model::value::{Memory, Type, Value};
 use crate::model::vocabulary::{Level, TimeOfDay};
 use avastra_base::rng;

@@ -13,11 +13,14 @@ pub mod effort;
 mod eval;
 pub mod expr;
 mod fact;
+mod facts;
 mod interval;
 mod limits;
 mod meaning;
 mod memory;
+mod numbers;
 mod on_route;
+mod outcome;
 pub mod policy;
 mod row;
 pub(crate) mod requirement;
@@ -29,16 +32,19 @@ mod trajectory;
 mod value;
 pub mod vocabulary;
 
+pub use body::BodyWord;
 pub use digest::{digest, digest_text};
-pub use eval::{
+pub use eval::evaluate;
+pub use expr::{FnDef, WordExpr};
+pub use facts::{
     CROSSWALK_GAP_M_MAX, Facts, JUNCTION_AHEAD_M_MAX, LEAD_GAP_M_MAX, LightTimes, MomentFacts, NearFacts,
-    NpcFacts, OutcomeFacts, SINCE_S_MAX, SpawnFacts, TIME_S_MAX, TickFacts, WorldFacts, evaluate,
+    NpcFacts, OutcomeFacts, RoadFacts, SINCE_S_MAX, SpawnFacts, TIME_S_MAX, TickFacts, WorldFacts,
 };
 pub use interval::{End, Interval};
 pub use limits::{
-    AMBIENT_MAX, COMMANDED_MAX, EARLY_S, EGO_ACCELERATION_MPS2_MAX, LIGHT_AT_M, LIMIT_PART_MAX, MEET, REPEAT,
-    SIGNAL_PHASE_S, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, SpawnFigures, TICK_MS,
-    WAITS_S, rounded_into, spawn_distance_m,
+    AMBIENT_MAX, COMMANDED_MAX, EARLY_S, EGO_ACCELERATION_MPS2_MAX, LIGHT_AT_M, LIMIT_PART_MAX, MEET,
+    OFFSET_M, REPEAT, SIGNAL_PHASE_S, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS,
+    SpawnFigures, TICK_MS, WAITS_S, rounded_into, spawn_distance_m,
 };
 pub use meaning::Meaning;
 pub(crate) use on_route::stretches;
@@ -46,7 +52,6 @@ pub use on_route::{LIGHT_AHEAD_M, NEAR_JUNCTION_M, OnRoute, Stretch, junction_ah
 pub use policy::Policy;
 pub use requirement::{Asked, Kept, ReadyRequirement, RequirementMemory};
 pub use row::locals;
-pub use row::{Reach, Row};
 pub use rules::{NoStart, RulesInForce, UnknownRule};
 pub use scenario::{
     Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle, Origin, REPLAYS_MAX, Scenario, ScenarioStart,
@@ -54,10 +59,10 @@ pub use scenario::{
 };
 pub use sliding::Sliding;
 pub use space::{
-    ACTION_ODDS_MAX, ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef,
-    GroupDef, InRow, Initial, LightDef, ManoeuvreCall, ManoeuvreDef, OrderDef, Parameter, PhaseDef,
-    RequirementDef, RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, SignalProgram,
-    Space, SpawnDef, StateDef, StateMeaning, VerdictDef, WordExpr, reached, told,
+    ACTION_ODDS_MAX, ActionDef, BodyDef, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, GroupDef, InRow,
+    Initial, LightDef, ManoeuvreCall, ManoeuvreDef, OrderDef, Parameter, PhaseDef, Reach, RequirementDef,
+    RewardCase, Road, Row, RuleBinding, RuleBody, RuleDef, SetDef, SignalProgram, Space, SpawnDef, StateDef,
+    StateMeaning, VerdictDef, reached, told,
 };
 pub use trajectory::{BesideRoute, Laid, Trajectory, TrajectoryDef, WayPoint, through};
 pub(crate) use value::STATE_MAX;

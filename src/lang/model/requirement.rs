@@ -6,13 +6,15 @@
 
 use std::collections::VecDeque;
 
-use crate::model::eval::{
-    Facts, MomentFacts, NearFacts, TickFacts, about, arithmetic, compare_numbers, evaluate,
-};
+use crate::model::body::BodyWord;
+use crate::model::eval::{about, evaluate};
+use crate::model::expr::FnDef;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
+use crate::model::facts::{Facts, MomentFacts, NearFacts, TickFacts};
 use crate::model::limits::TICK_MS;
+use crate::model::numbers::{arithmetic, compare_numbers};
 use crate::model::sliding::Sliding;
-use crate::model::space::{BodyWord, FnDef, RequirementDef};
+use crate::model::space::RequirementDef;
 use crate::model::value::Type;
 use crate::model::vocabulary::{Known, Light, NearWord, PastWord, Word, WordFact};
 use avastra_base::units::Dimension;

@@ -4,14 +4,13 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::model::body::BodyParameters;
+use crate::model::body::{BodyParameters, BodyWord};
 use crate::model::command::{CommandDef, Moves, Told};
-use crate::model::eval::{Facts, evaluate};
-use crate::model::expr::{Expr, ExprKind, Who};
+use crate::model::eval::evaluate;
+use crate::model::expr::{Expr, ExprKind, FnDef, Who, WordExpr};
+use crate::model::facts::{Facts, RoadFacts};
 use crate::model::interval::Interval;
 use crate::model::meaning::Meaning;
-use crate::model::on_route::Stretch;
-use crate::model::row::Row;
 use crate::model::rules::{Bound, Clause};
 use crate::model::trajectory::{Laid, TrajectoryDef};
 use crate::model::value::{EnumIndex, Type, Value};
@@ -119,6 +118,41 @@ pub enum StateMeaning {
     Sky(Vec<Phenomenon>, Vec<Level>),
 }
 
+/// One row. Its number is the index of the network's output.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    pub index: usize,
+    /// Index in `Space::actions`.
+    pub action: usize,
+    /// Names and values of the `each` parameters, as declared.
+    pub axes: Vec<(Arc<str>, Value)>,
+    /// `drive_ahead(lane: Left, mode: Near, then: Change)`.
+    pub label: String,
+    /// Indices in `Space::rules` of the rules that bind the row, optional ones included.
+    pub rules: Arc<[usize]>,
+    /// What is proved of the row on each road of `Space::roads` under the default rules.
+    pub roads: Vec<Reach>,
+}
+
+/// Whether a row can run on a road.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Reach {
+    /// The row is not proved dead. Holds the ranges that the rules leave to its drawn numbers, SI.
+    Open(Vec<(Arc<str>, Interval)>),
+    /// The rules forbid every draw.
+    Dead { rules: Vec<usize>, reason: String },
+}
+
+impl Reach {
+    /// The ranges that the rules leave to the drawn numbers; `None` if the row is dead.
+    pub fn ranges(&self) -> Option<&[(Arc<str>, Interval)]> {
+        match self {
+            Reach::Open(ranges) => Some(ranges),
+            Reach::Dead { .. } => None,
+        }
+    }
+}
+
 /// A body of the author's own.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BodyDef {
@@ -126,37 +160,6 @@ pub struct BodyDef {
     pub docs: Vec<String>,
     pub like: Body,
     pub shape: BodyParameters,
-    pub span: Span,
-}
-
-/// What a spawn calls a body: one of the engine, or one of the author's own that is like it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct BodyWord {
-    pub like: Body,
-    /// Index in [`Space::bodies`].
-    pub own: Option<usize>,
-}
-
-impl BodyWord {
-    /// A body of the engine.
-    pub const fn engine(like: Body) -> BodyWord {
-        BodyWord { like, own: None }
-    }
-
-    /// Whether this is what a body of that name means: one of the engine's names stands for the author's own that are
-    /// like it, too.
-    pub fn is(self, named: BodyWord) -> bool {
-        self.like == named.like && (named.own.is_none() || self.own == named.own)
-    }
-}
-
-/// A pure function; its parameters are the locals of its body.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FnDef {
-    pub name: String,
-    pub parameters: Vec<(String, Type)>,
-    pub result: Type,
-    pub body: Expr,
     pub span: Span,
 }
 
@@ -499,14 +502,6 @@ pub struct OrderDef {
     pub span: Span,
 }
 
-/// A word of the engine: fixed, or chosen by a value of one of the author's enums.
-#[derive(Debug, Clone, PartialEq)]
-pub enum WordExpr<W> {
-    Fixed(W),
-    /// The word for each variant of the expression's enum.
-    Of(Expr, Vec<W>),
-}
-
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupDef {
     pub name: String,
@@ -653,34 +648,6 @@ pub struct SignalProgram {
     pub green_s: Option<f64>,
     pub yellow_s: Option<f64>,
     pub all_red_s: Option<f64>,
-}
-
-/// What rules may ask about a road.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RoadFacts {
-    /// What the road is called.
-    pub name: String,
-    /// The lowest limit of the route's lanes: a drawn speed must be legal on the whole of it, SI.
-    pub limit: Rational,
-    /// `limit` as a float, m/s.
-    pub limit_mps: f64,
-    /// Where on the route that is, in words, unless it is everywhere.
-    pub limited_at: Option<String>,
-    /// Which lanes in the ego vehicle's direction exist somewhere along the route, by
-    /// [`LaneChoice`] in its order: left, current, right.
-    pub lanes: [bool; 3],
-    /// The lowest and the highest limit of any lane of the map, m/s.
-    pub map_limits_mps: [f64; 2],
-    /// Whether a stop sign stands at the route.
-    pub has_stop_sign: bool,
-    /// The route, by what each part of it says of a moment; none, if that is not known.
-    pub stretches: Arc<[Stretch]>,
-}
-
-impl RoadFacts {
-    pub fn has_lane(&self, lane: LaneChoice) -> bool {
-        self.lanes[lane as usize]
-    }
 }
 
 impl Space {

@@ -11,7 +11,7 @@
 use crate::model::value::Type;
 use avastra_base::units::Dimension;
 
-pub use crate::model::fact::Fact;
+pub use crate::model::fact::{Fact, parts_of, parts_of_named, things};
 
 /// A word of the engine: it has a spelling, and the spelling finds it again.
 pub trait Word: Copy + PartialEq + 'static {
@@ -156,13 +156,6 @@ impl Site {
         }
     }
 
-    /// Whether a fact is known here. What a spawn asks for is known at the draw alone.
-    pub fn knows_fact(self, fact: Fact) -> bool {
-        let is_of_spawn = matches!(fact, Fact::SpawnGap | Fact::SafetyGap);
-        self.knows(fact.known())
-            && !(is_of_spawn && matches!(self, Site::Change | Site::Phase | Site::RequirementOn))
-    }
-
     pub fn is_requirement(self) -> bool {
         matches!(self, Site::Requirement | Site::RequirementOn)
     }
@@ -172,20 +165,9 @@ impl Site {
         matches!(self, Site::Rule | Site::StepBegins)
     }
 
-    /// The facts that are known here.
-    pub fn facts(self) -> impl Iterator<Item = Fact> {
-        Fact::ALL.iter().copied().filter(move |fact| self.knows_fact(*fact))
-    }
-
     /// Those that are words.
     pub fn word_facts(self) -> impl Iterator<Item = WordFact> {
         WordFact::ALL.iter().copied().filter(move |fact| self.knows(fact.known()))
-    }
-
-    /// Whether anything can be asked of a thing (`road`) here.
-    pub fn knows_thing(self, thing: &str) -> bool {
-        self.facts().any(|fact| thing_of(fact.name()) == Some(thing))
-            || self.word_facts().any(|fact| thing_of(fact.name()) == Some(thing))
     }
 }
 
@@ -310,38 +292,6 @@ word_facts! {
 /// The thing before the `.` of a name: `road` for `road.limit`.
 pub fn thing_of(name: &'static str) -> Option<&'static str> {
     name.split_once('.').map(|(thing, _)| thing)
-}
-
-/// The names with a `.`, each with its sentence.
-fn dotted() -> impl Iterator<Item = (&'static str, &'static str)> {
-    let facts = Fact::ALL.iter().map(|fact| (fact.name(), fact.meaning()));
-    let words = WordFact::ALL.iter().map(|fact| (fact.name(), fact.meaning()));
-    facts.chain([ROAD_LANES]).chain(words).filter(|(name, _)| name.contains('.'))
-}
-
-/// The things that have facts: the words before a `.`.
-pub fn things() -> Vec<&'static str> {
-    let mut things: Vec<&str> = Vec::new();
-    for thing in dotted().filter_map(|(name, _)| thing_of(name)) {
-        if !things.contains(&thing) {
-            things.push(thing);
-        }
-    }
-    things
-}
-
-/// The facts of a thing (`road`): the words after its `.`, each with its sentence.
-pub fn parts_of(thing: &str) -> Vec<(&'static str, &'static str)> {
-    let parts = dotted().filter_map(|(name, meaning)| Some((name.split_once('.')?, meaning)));
-    parts.filter(|((of, _), _)| *of == thing).map(|((_, part), meaning)| (part, meaning)).collect()
-}
-
-/// The facts of a road user that is named, or told by its number, each with its sentence: without those that are watched of each
-/// one near alone.
-pub fn parts_of_named() -> Vec<(&'static str, &'static str)> {
-    let is_watched =
-        |part: &str| Fact::from_name(&format!("npc.{part}")).is_some_and(|fact| fact.known() == Known::Near);
-    parts_of("npc").into_iter().filter(|(part, _)| !is_watched(part)).collect()
 }
 
 words! {

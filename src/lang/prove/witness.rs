@@ -12,8 +12,8 @@ use std::cell::Cell;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
+use crate::model::OFFSET_M;
 use crate::model::body::parameters;
-use crate::model::command::OFFSET_M;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Before, Candidate, Choose, Demand, Nearest, Room, RowRules, cells_read};
 use crate::model::{

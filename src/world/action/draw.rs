@@ -12,8 +12,9 @@ use crate::action::{
 };
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
+use avastra_lang::model::OFFSET_M;
 use avastra_lang::model::body::{OwnBody, parameters};
-use avastra_lang::model::command::{Command, IgnoredRules, OFFSET_M, Told};
+use avastra_lang::model::command::{Command, IgnoredRules, Told};
 use avastra_lang::model::expr::{Expr, Who};
 use avastra_lang::model::rules::{
     Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,

@@ -6,11 +6,14 @@
 //! polynomials may be found, never too few.
 
 use crate::model::effort;
-use crate::model::eval::{Facts, arithmetic, compare, evaluate, of_numbers};
+use crate::model::eval::evaluate;
+use crate::model::expr::FnDef;
 use crate::model::expr::{Arithmetic, Expr, ExprKind};
+use crate::model::facts::Facts;
+use crate::model::numbers::{arithmetic, compare, of_numbers};
 use crate::model::rules::polynomial::Polynomial;
 use crate::model::rules::{Clause, Demand, RowRules, Source, state_at};
-use crate::model::space::{FnDef, SetDef, StateDef};
+use crate::model::space::{SetDef, StateDef};
 use crate::model::value::Value;
 use crate::model::vocabulary::{Known, NumberWord};
 

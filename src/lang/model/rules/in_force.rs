@@ -1,7 +1,7 @@
 //! Which rules are in force: all that are not optional, changed by `--with` and `--without`.
 
 use crate::model::effort;
-use crate::model::row::Row;
+use crate::model::space::Row;
 use crate::model::space::{RuleDef, Space};
 use crate::syntax::{listed, nearest};
 

@@ -1,7 +1,9 @@
 //! The judgement: which rules a complete choice of values breaks.
 
-use crate::model::eval::{Facts, SpawnFacts, WorldFacts, compare, evaluate, word_of, word_of_bearer};
+use crate::model::eval::{evaluate, word_of, word_of_bearer};
 use crate::model::expr::{Expr, ExprKind, Who};
+use crate::model::facts::{Facts, SpawnFacts, WorldFacts};
+use crate::model::numbers::compare;
 use crate::model::rules::{Bound, Clause, Demand, RowRules, Source};
 use crate::model::space::Parameter;
 use crate::model::value::{Memory, Value};

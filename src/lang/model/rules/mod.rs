@@ -44,8 +44,9 @@ pub(crate) use start::{Combinations, cells_read, state_at};
 
 use crate::model::effort;
 use crate::model::expr::Expr;
-use crate::model::row::Row;
-use crate::model::space::{RoadFacts, RuleBinding, RuleBody, RuleDef, Space};
+use crate::model::facts::RoadFacts;
+use crate::model::space::Row;
+use crate::model::space::{RuleBinding, RuleBody, RuleDef, Space};
 
 /// One row on one road, under the rules in force.
 #[derive(Clone, Copy)]

@@ -19,8 +19,9 @@ use std::cell::Cell;
 use std::rc::Rc;
 
 use crate::model::effort;
-use crate::model::eval::{Facts, WorldFacts, evaluate};
+use crate::model::eval::evaluate;
 use crate::model::expr::{Comparison, ExprKind};
+use crate::model::facts::{Facts, WorldFacts};
 use crate::model::rules::critical::polynomials;
 use crate::model::rules::polynomial::{NUMBERS_MAX, Polynomial, project};
 use crate::model::rules::{Candidate, Clause, Room, RowRules, RulesInForce};

@@ -7,10 +7,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::model::effort;
-use crate::model::eval::{Facts, MomentFacts, WorldFacts, evaluate};
+use crate::model::eval::evaluate;
 use crate::model::expr::{Expr, ExprKind};
+use crate::model::facts::{Facts, MomentFacts, RoadFacts, WorldFacts};
 use crate::model::rules::RulesInForce;
-use crate::model::space::{Initial, Road, RoadFacts, RuleDef, Space, StateDef};
+use crate::model::space::{Initial, Road, RuleDef, Space, StateDef};
 use crate::model::value::{Memory, Type, Value};
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
