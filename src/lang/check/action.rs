@@ -3,11 +3,12 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use crate::check::checker::{Checker, docs, each, literal};
+use crate::check::checker::{Checker, each, literal};
 use crate::check::declaration::{even_odds, unknown_word};
 use crate::check::expression::{NUMBER_MAX, Place, is_beyond_states, is_number};
+use crate::check::names::docs;
 use crate::check::operator::with_range;
-use crate::check::references::Symbol;
+use crate::check::references::{PARAMETERS_MAX, Symbol};
 use crate::check::report::{Report, all_of, as_written, field};
 use crate::check::rule::locals;
 use crate::model::expr::Expr;
@@ -33,9 +34,6 @@ const VALUES_MAX: i64 = 100_000;
 
 /// Largest number of values that the parameters of all actions list together. A value counts once for each of its odds.
 const LISTED_MAX: usize = 2_000_000;
-
-/// Largest number of parameters of an action or a function.
-pub(super) const PARAMETERS_MAX: usize = 100;
 
 /// Largest number of road users that one action spawns.
 const SPAWNS_MAX: usize = 100;

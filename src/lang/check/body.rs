@@ -1,8 +1,9 @@
 //! Bodies of the author's own, and what a spawn calls a body.
 
-use crate::check::checker::{Checker, docs};
+use crate::check::checker::Checker;
 use crate::check::declaration::unknown_word;
 use crate::check::expression::Place;
+use crate::check::names::docs;
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, field};

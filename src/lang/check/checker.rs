@@ -10,9 +10,6 @@ use std::sync::Arc;
 use crate::check::names::{Names, unknown};
 use crate::check::references::{References, Symbol};
 use crate::check::report::Report;
-use crate::check::requirement::Required;
-use crate::check::road::Maps;
-use crate::check::rule::Doers;
 use crate::check::{style, unused};
 use crate::model::command::Told;
 use crate::model::effort;
@@ -27,7 +24,8 @@ use crate::prove;
 use crate::prove::{Known, RunsIn, enclose, product_size};
 use crate::syntax::ast::{FileId, ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
-use avastra_base::units::Rational;
+use avastra_base::units::{Dimension, Rational};
+use avastra_road::{LanePlace, RoadError, RoadMap, Route};
 
 /// The most diagnostics of a file: more are of no use, and each is found in the text by its place.
 pub(super) const DIAGNOSTICS_MAX: usize = 1_000;
@@ -37,6 +35,29 @@ const STEPS_MAX: u64 = 20_000_000;
 
 /// A function's parameters, its result type, and the span of its header.
 pub(super) type Signature = (Vec<(String, Type)>, Type, Span);
+
+/// Loads maps. Its implementation knows the folder of the file that names a map.
+pub(crate) trait Maps {
+    /// The map and its path, or in words why it cannot be used.
+    fn map(&mut self, name: &ast::Text) -> Result<(PathBuf, Arc<RoadMap>), String>;
+
+    /// The route between two places of a map.
+    fn route(&mut self, map: &Arc<RoadMap>, start: LanePlace, goal: LanePlace) -> Result<Route, RoadError>;
+}
+
+/// The actions by what they do.
+pub(super) struct Doers {
+    /// By state: those that set it.
+    pub setters: Vec<Vec<usize>>,
+    pub spawners: Vec<usize>,
+}
+
+/// The requirements of a space. All names are known from the first one on: one that asks about another is told why it cannot.
+pub(super) struct Required {
+    pub names: Names,
+    /// Those that were checked and have no mistake, each with the dimension of its margin.
+    pub margins: Vec<(String, Option<Dimension>)>,
+}
 
 /// Names that are known before any declaration is checked.
 #[derive(Default)]
@@ -459,8 +480,4 @@ pub(super) fn each<'a, T: 'a>(
     pick: impl Fn(&'a ItemKind) -> Option<&'a T> + 'a,
 ) -> impl Iterator<Item = (&'a ast::Item, &'a T)> {
     items.iter().filter_map(move |item| pick(&item.kind).map(|found| (*item, found)))
-}
-
-pub(super) fn docs(item: &ast::Item) -> Vec<String> {
-    item.docs.iter().map(|doc| doc.text.clone()).collect()
 }

@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use crate::check::checker::{Checker, Signature, docs, each};
+use crate::check::checker::{Checker, Signature, each};
 use crate::check::expression::{NUMBER_MAX, Place, article, is_beyond_states};
+use crate::check::names::docs;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of};
 use crate::check::rule::names_in;

@@ -9,6 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::check::load::Loaded;
+use crate::check::names::flat;
 use crate::model::rules::RowRules;
 use crate::model::{Interval, Road, Row, RuleBody, RulesInForce, Space, Type};
 
@@ -140,11 +141,6 @@ fn order(old: &Side<'_>, new: &Side<'_>) -> Option<Difference> {
     let (before, after) = (shared(old, new), shared(new, old));
     let (was, is) = before.iter().zip(&after).find(|(was, is)| was != is)?;
     Some(difference(Change::Moved, is.as_str(), format!("it comes before {was} now")))
-}
-
-/// A declaration on one line.
-pub(super) fn flat(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// The part of a declaration's text that changed: the lines from the first to the last that differ.

@@ -3,13 +3,15 @@
 //! Files are read through a function that `cli` gives; nothing here reads the disk itself.
 
 use std::collections::BTreeMap;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::check::checker::{Checked, DIAGNOSTICS_MAX, Root, Runs};
+use crate::check::checker::{Checked, DIAGNOSTICS_MAX, Maps, Root, Runs};
+use crate::check::files::{
+    LoadedFile, ReadError, ReadFile, folder, maps_named, normal, path_from, used_path, uses,
+};
 use crate::check::meaning::meaning;
 use crate::check::references::References;
-use crate::check::road::Maps;
 use crate::check::{checker, overriding, policy, scenario, scenario_names};
 use crate::model::policy::Policy;
 use crate::model::scenario::Scenario;
@@ -19,21 +21,6 @@ use crate::syntax::{Diagnostic, Severity, Sources, TOKENS_MAX, ast, parse};
 use avastra_base::outside::Shown;
 use avastra_base::threads::in_order;
 use avastra_road::{LanePlace, RoadError, RoadMap, Route};
-
-/// Why a file cannot be read, in a few words: `no such file`, `a directory`, `not text`.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct ReadError(pub String);
-
-/// Gives the text of a file.
-pub type ReadFile<'a> = dyn Fn(&Path) -> Result<String, ReadError> + 'a;
-
-/// One file that was read.
-#[derive(Debug, Clone)]
-pub struct LoadedFile {
-    pub path: PathBuf,
-    pub tree: ast::File,
-}
 
 /// A root file with all it uses, checked.
 #[derive(Debug, Clone)]
@@ -329,35 +316,6 @@ fn check_digests(maps: &mut MapReader<'_>) -> Vec<Diagnostic> {
     diagnostics
 }
 
-pub(super) fn uses(file: &LoadedFile) -> impl Iterator<Item = &ast::Use> {
-    file.tree.items.iter().filter_map(|item| item.kind.as_use())
-}
-
-/// The paths of the files that a file uses.
-pub(super) fn used_paths(file: &LoadedFile) -> impl Iterator<Item = PathBuf> {
-    uses(file).map(|used| used_path(file, used))
-}
-
-/// The path of the file that a `use` names.
-pub(super) fn used_path(file: &LoadedFile, used: &ast::Use) -> PathBuf {
-    path_from(file, &used.path.value)
-}
-
-/// The path that a file means by a text.
-pub(super) fn path_from(file: &LoadedFile, written: &str) -> PathBuf {
-    normal(&folder(&file.path).join(written))
-}
-
-/// The maps that a file's roads name, as written, and where.
-pub(super) fn maps_named(file: &LoadedFile) -> impl Iterator<Item = (&str, Span)> {
-    let roads = file.tree.items.iter().filter_map(|item| item.kind.plain().as_road());
-    let fields = roads.flat_map(|block| block.fields.iter().filter(|field| field.name.text == "map"));
-    fields.filter_map(|field| match &field.value.kind {
-        ast::ExprKind::Text(path) => Some((path.as_str(), field.value.span)),
-        _ => None,
-    })
-}
-
 struct Loader<'a> {
     read: &'a ReadFile<'a>,
     known: Option<&'a mut KnownFiles>,
@@ -564,23 +522,4 @@ fn map_of(path: &Path, text: &str) -> Result<Arc<RoadMap>, String> {
 
 fn stem(path: &Path) -> String {
     path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
-}
-
-fn folder(path: &Path) -> PathBuf {
-    path.parent().map(Path::to_owned).unwrap_or_default()
-}
-
-/// The path without `.` and, where possible, without `..`, so that a file has one path.
-pub fn normal(path: &Path) -> PathBuf {
-    let mut parts: Vec<Component<'_>> = Vec::new();
-    for part in path.components() {
-        match (part, parts.last()) {
-            (Component::CurDir, _) => {}
-            (Component::ParentDir, Some(Component::Normal(_))) => {
-                parts.pop();
-            }
-            _ => parts.push(part),
-        }
-    }
-    parts.iter().collect()
 }

@@ -2,8 +2,9 @@
 
 use core::ops::RangeInclusive;
 
-use crate::check::checker::{Checker, docs, each};
+use crate::check::checker::{Checker, each};
 use crate::check::expression::Place;
+use crate::check::names::docs;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, as_written, field};
 use crate::model::command::{CommandDef, Moves, Told};

@@ -12,7 +12,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use crate::check::load::{LoadedFile, path_from, used_paths};
+use crate::check::files::{LoadedFile, path_from, used_paths};
 use crate::check::overriding;
 use crate::model::Meaning;
 use crate::syntax::ast::{self, ExprKind, ItemKind};

@@ -26,6 +26,7 @@ mod difference;
 mod expect;
 pub mod explain;
 mod expression;
+mod files;
 mod load;
 mod manoeuvre;
 mod meaning;
@@ -54,10 +55,8 @@ mod unused;
 
 pub use checker::{Claim, Runs};
 pub use difference::{Change, Difference, differences};
-pub use load::{
-    KnownSpaces, Loaded, LoadedFile, MapCache, ReadError, ReadFile, WrittenPath, files_used, load,
-    load_among, load_with, normal,
-};
+pub use files::{LoadedFile, ReadError, ReadFile, normal};
+pub use load::{KnownSpaces, Loaded, MapCache, WrittenPath, files_used, load, load_among, load_with};
 pub use missing_use::suggest_uses;
 pub use references::{Declaration, Occurrence, References, Symbol};
 

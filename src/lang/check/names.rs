@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::model::code;
+use crate::syntax::ast;
 use crate::syntax::ast::{Name, Span};
 use crate::syntax::{Diagnostic, listed, nearest};
 
@@ -98,4 +99,14 @@ fn foreign(name: &str) -> Option<(&'static str, Option<&'static str>)> {
         "if" => ("`match` chooses a value: `match near { true => 3 m, false => 9 m }`", None),
         _ => return None,
     })
+}
+
+/// The documentation of a declaration, line by line.
+pub(super) fn docs(item: &ast::Item) -> Vec<String> {
+    item.docs.iter().map(|doc| doc.text.clone()).collect()
+}
+
+/// A declaration on one line.
+pub(super) fn flat(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use crate::check::load::{LoadedFile, used_path, used_paths, uses as uses_of};
+use crate::check::files::{LoadedFile, used_path, used_paths, uses as uses_of};
 use crate::check::names::unknown;
 use crate::check::unused::names_of_expr;
 use crate::model::code;

@@ -8,13 +8,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use crate::check::action::PARAMETERS_MAX;
-use crate::check::checker::docs;
-use crate::check::load::{LoadedFile, maps_named, path_from, used_path, uses};
+use crate::check::files::{LoadedFile, maps_named, path_from, used_path, uses};
+use crate::check::names::docs;
 use crate::model::vocabulary::{ROAD_USER, TYPES, Word};
 use crate::model::{EnumDef, EnumIndex, Type};
 use crate::syntax::ast::{FileId, Item, ItemKind, Name, Number, ParamMode, Span};
 use crate::syntax::{Sources, ast};
+
+/// Largest number of parameters of an action or a function.
+pub(super) const PARAMETERS_MAX: usize = 100;
 
 /// What a name stands for. Two declarations of one kind and name are one symbol: an `override` and what it
 /// replaces are renamed together.

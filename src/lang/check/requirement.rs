@@ -1,9 +1,9 @@
 //! Requirements: what the ego vehicle must keep.
 
-use crate::check::checker::{Checker, docs};
-use crate::check::difference::flat;
+use crate::check::checker::{Checker, Required};
 use crate::check::expression::Place;
-use crate::check::names::Names;
+use crate::check::names::docs;
+use crate::check::names::flat;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, with_value};
 use crate::model::expr::{Comparison, Expr, ExprKind};
@@ -19,13 +19,6 @@ const REQUIREMENTS_MAX: usize = 64;
 
 /// The longest `within`, s: that of an observation period.
 const WITHIN_S_MAX: i64 = 600;
-
-/// The requirements of a space. All names are known from the first one on: one that asks about another is told why it cannot.
-pub(super) struct Required {
-    names: Names,
-    /// Those that were checked and have no mistake, each with the dimension of its margin.
-    margins: Vec<(String, Option<Dimension>)>,
-}
 
 impl Checker {
     /// All requirements. `--with` and `--without` name them as they do rules, so no rule has the name of one.

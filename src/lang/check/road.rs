@@ -1,11 +1,11 @@
 //! Roads: each has a map, a start and a goal on it, the route between them, and the facts that rules may use.
 
 use std::ops::RangeInclusive;
-use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::check::checker::{Checker, docs};
+use crate::check::checker::{Checker, Maps};
 use crate::check::expression::{Place, number_help};
+use crate::check::names::docs;
 use crate::check::names::unknown;
 use crate::check::report::{Report, all_of, field};
 use crate::model::vocabulary::{RoadField, Word};
@@ -16,19 +16,10 @@ use crate::model::{
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, print_expr};
 use avastra_base::units::{Dimension, Rational};
-use avastra_road::{LEVEL_SLOPE_MAX, LanePlace, Obstacle, RoadError, RoadMap, Route, SignKind};
+use avastra_road::{LEVEL_SLOPE_MAX, LanePlace, Obstacle, RoadMap, Route, SignKind};
 
 /// Least speed that an ego vehicle may want, m/s: it has to arrive.
 const SET_MPS_MIN: f64 = 1.0;
-
-/// Loads maps. Its implementation knows the folder of the file that names a map.
-pub(crate) trait Maps {
-    /// The map and its path, or in words why it cannot be used.
-    fn map(&mut self, name: &ast::Text) -> Result<(PathBuf, Arc<RoadMap>), String>;
-
-    /// The route between two places of a map.
-    fn route(&mut self, map: &Arc<RoadMap>, start: LanePlace, goal: LanePlace) -> Result<Route, RoadError>;
-}
 
 /// How long a light may show a colour, s; red for all may be left out.
 const LIGHT_S_MIN: f64 = 0.5;

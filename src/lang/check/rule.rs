@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use crate::check::checker::{Checker, docs};
+use crate::check::checker::{Checker, Doers};
 use crate::check::expression::{Place, enum_of};
+use crate::check::names::docs;
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
@@ -20,13 +21,6 @@ use crate::syntax::{Diagnostic, ast, listed};
 
 /// Operations that a condition with a mistake counts as, because checking it takes time for each action, too.
 const OPERATIONS_BROKEN: usize = 8;
-
-/// The actions by what they do.
-pub(super) struct Doers {
-    /// By state: those that set it.
-    setters: Vec<Vec<usize>>,
-    spawners: Vec<usize>,
-}
 
 impl Checker {
     pub(super) fn doers(&self) -> Doers {

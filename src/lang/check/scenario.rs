@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use core::ops::{Range, RangeInclusive};
 
-use crate::check::checker::docs;
+use crate::check::names::docs;
 use crate::check::names::unknown;
 use crate::check::report::Report;
 use crate::check::scenario_condition::condition;

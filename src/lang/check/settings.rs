@@ -1,7 +1,8 @@
 //! Checks the `episode`, `reward` and `verdict` declarations: which fields they may have, and of which type.
 
-use crate::check::checker::{Checker, docs, each};
+use crate::check::checker::{Checker, each};
 use crate::check::expression::Place;
+use crate::check::names::docs;
 use crate::check::report::{Report, with_value};
 use crate::check::rule::names_in;
 use crate::model::expr::{Expr, ExprKind};

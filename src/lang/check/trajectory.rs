@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::check::checker::{Checker, docs};
+use crate::check::checker::Checker;
+use crate::check::checker::Maps;
 use crate::check::expression::Place;
+use crate::check::names::docs;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, field};
-use crate::check::road::Maps;
 use crate::model::vocabulary::{PointField, TrajectoryField, Word};
 use crate::model::{
     BesideRoute, Laid, Road, Trajectory, TrajectoryDef, Type, WayPoint, WordExpr, code, through,

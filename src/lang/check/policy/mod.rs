@@ -8,7 +8,7 @@ pub(super) use lines::value_of;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::check::checker::docs;
+use crate::check::names::docs;
 use crate::check::policy::lines::rules;
 use crate::model::policy::{Net, Policy, PolicyClaims, PolicyOrigin, record, seal, weights_from_lines};
 use crate::model::{Space, code};
