@@ -13,10 +13,9 @@ use crate::cases::root;
 /// A circle of more files than this is a knot.
 const FILES_MAX: usize = 6;
 /// The knots that there are still, by their folder: how many files they have at most. They may only become smaller.
-const KNOTS: [(&str, usize); 4] =
-    [("exchange/import", 26), ("lang/check", 20), ("lang/model", 16), ("world/sim", 23)];
+const KNOTS: [(&str, usize); 2] = [("exchange/import", 26), ("world/sim", 23)];
 /// How many circles there are, the knots included. They may only become fewer.
-const CIRCLES: usize = 26;
+const CIRCLES: usize = 27;
 
 /// The name of a module within its crate: `["sim", "world"]`.
 type Module = Vec<String>;
