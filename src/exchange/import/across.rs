@@ -5,10 +5,10 @@ use avastra_lang::model::OFFSET_M;
 use avastra_road::{Lane, LanePlace, Side};
 
 use super::action::{Dynamics, Over, Target};
+use super::cast::{Cast, Moving};
 use super::order::is_aside;
 use super::phases::{Told, instead_of};
 use super::said::Said;
-use super::scene::{Cast, Moving};
 use super::source::{Mark, Source};
 
 /// The fastest that somebody is told to move aside, m/s.

@@ -6,8 +6,7 @@ use roxmltree::Node;
 
 use super::position::{Position, position, route};
 use super::shape::{Shape, shape_of};
-use super::source::{Mark, Source, children, element};
-use super::story::DURATION_S_MAX;
+use super::source::{DURATION_S_MAX, Mark, Source, children, element};
 
 const FOLLOWING: [&str; 2] = ["follow", "position"];
 

@@ -7,9 +7,9 @@ use std::rc::Rc;
 use avastra_road::RoadMap;
 use roxmltree::Node;
 
-use super::Files;
 use super::body::Body;
 use super::ground::{Ground, Known, once};
+use super::source::Files;
 use super::source::{Source, children, element, elements, filled, plain};
 use super::vocabulary;
 

@@ -1,20 +1,16 @@
 //! Triggers as conditions of the language, asked while a phase waits.
 
 use avastra_base::geometry::Vec2;
-use avastra_world::sim::VehicleParameters;
 
 use super::across::LanesBeside;
 use super::action::{ActKind, Speed};
+use super::cast::{Cast, EGO_FRONT_M, Moving, is_called};
 use super::order::{is_aside, is_speed};
 use super::phases::ARRIVES_M;
 use super::said::Said;
-use super::scene::{Cast, Moving};
 use super::source::{Mark, Source};
 use super::story::Event;
 use super::trigger::{Clearance, Condition, Edge, Pair, Trigger, When, asks_for_less};
-
-/// From the ego vehicle's rear axle to its front in avastra, m: what the language's `ego.front` is ahead of a file's reference point.
-pub const EGO_FRONT_M: f64 = VehicleParameters::MKZ.rear_axle_to_front_m;
 
 /// Who drives through a circle of a smaller radius may be through it within a tick: it is reached once its near edge is, m.
 const PASSED_M: f64 = 1.0;
@@ -583,10 +579,4 @@ fn needs_alone(condition: &Condition) -> bool {
 /// Whether a place is reached for a moment only.
 fn is_small_circle(kind: &When) -> bool {
     matches!(kind, When::Reaches { within_m, is_less: true, .. } if *within_m < PASSED_M)
-}
-
-/// Whether an event, or something that holds it, has a name.
-pub fn is_called(event: &Event, kind: &str, name: &str) -> bool {
-    let last = name.rsplit("::").next().unwrap_or(name);
-    event.names.iter().any(|(of, own)| *of == kind && own == last)
 }

@@ -17,6 +17,7 @@
 mod across;
 mod action;
 mod body;
+mod cast;
 mod catalogue;
 mod chance;
 mod condition;
@@ -41,6 +42,7 @@ mod trigger;
 mod variation;
 mod vocabulary;
 mod ways;
+mod whole;
 mod weather;
 mod write;
 
@@ -51,69 +53,13 @@ use avastra_road::Lines;
 use roxmltree::Document;
 
 use catalogue::Library;
-use scene::Scene;
-use sky::Sky;
 use source::Source;
-use story::Story;
 use variation::Values;
+use whole::Whole;
 
+pub use source::{Files, Refusal};
 pub use variation::{VARIATIONS_MAX, VARIATIONS_USUAL};
-
-/// Gives the texts of the files that a file names.
-pub trait Files {
-    /// The scenario at a path that a file of variations names.
-    ///
-    /// # Errors
-    /// Why it cannot be read.
-    fn scenario(&self, path: &str) -> Result<String, String>;
-
-    /// The map at a path that the scenario names.
-    ///
-    /// # Errors
-    /// Why it cannot be read.
-    fn map(&self, path: &str) -> Result<String, String>;
-
-    /// The `.xosc` files in a folder of catalogues: what each is called, without its ending, and its text.
-    ///
-    /// # Errors
-    /// Why they cannot be read.
-    fn catalogues(&self, folder: &str) -> Result<Vec<(String, String)>, String>;
-}
-
-/// A file of another tool in the language.
-#[derive(Debug)]
-pub struct Imported {
-    /// `None` of a file that avastra exported: its scenario stands alone.
-    pub space: Option<String>,
-    /// A scenario that stands alone, or plays the only row of the space, which it uses as `NAME.ava`.
-    pub scenario: Option<String>,
-    /// The maps, as paths from the file of the other tool; the text names each by its file name alone.
-    pub maps: BTreeSet<String>,
-    /// What drives otherwise here than the file says.
-    pub notes: BTreeSet<String>,
-}
-
-/// Something that the language cannot say, or that is no OpenSCENARIO.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
-pub struct Refusal {
-    /// The scenario that a file of variations names, where the line is one of that.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub scenario: Option<String>,
-    pub line: u32,
-    /// The name of the XML element.
-    pub element: String,
-    pub reason: String,
-}
-
-/// One variation of a scenario.
-struct Variant {
-    values: Values,
-    /// As a path from the file that is imported.
-    map: String,
-    scene: Scene,
-    sky: Sky,
-    duration_s: f64,
-}
+pub use whole::Imported;
 
 /// How a file is to be read.
 #[derive(Debug, Clone, Copy)]
@@ -211,73 +157,6 @@ pub fn openscenario(text: &str, request: &Request, files: &dyn Files) -> Result<
             }
             Ok(write::space(&whole, &distribution.parameters, name))
         }
-    }
-}
-
-/// All variations of a file.
-struct Whole<'a> {
-    ego: Option<&'a str>,
-    description: String,
-    notes: BTreeSet<String>,
-    /// One or more.
-    variants: Vec<Variant>,
-    /// How many variations have values that the scenario's own constraints exclude.
-    excluded: usize,
-    /// Whether the scenario has nothing that no version has.
-    is_known: bool,
-}
-
-impl Whole<'_> {
-    /// Reads the scenario with the values of one variation. What is refused comes with whether the file itself excludes the values.
-    fn add(
-        &mut self,
-        document: &Document,
-        lines: &Rc<Lines>,
-        library: &Library,
-        values: Values,
-        asked: &Values,
-    ) -> Result<(), (Vec<Refusal>, bool)> {
-        let mut source = Source::new(Rc::clone(lines), asked, library);
-        // What is told of values that the file excludes is dropped, so it is told again of others.
-        if !self.is_known {
-            let found = vocabulary::looked_over(document.root_element());
-            self.is_known = found.unknown.is_empty();
-            for (node, reason) in found.unknown {
-                source.refuse::<()>(node, reason);
-            }
-            found.noted.into_iter().for_each(|note| source.note(note));
-        }
-        let story = story::read(&mut source, document, self.ego);
-        let story = story.filter(|_| !source.is_excluded);
-        let found = story.and_then(|story| {
-            let scene = Scene::of(&mut source, &story)?;
-            Some((scene, self.sky(&mut source, &story)?, story))
-        });
-        let (is_excluded, notes) = (source.is_excluded, source.notes());
-        match (found, source.refusals()) {
-            (Some((scene, sky, story)), refusals) if refusals.is_empty() => {
-                self.notes.extend(notes);
-                self.description.clone_from(&story.description);
-                let map = library.beside(&story.map.1.replace('\\', "/"));
-                let duration_s = story.duration_s;
-                self.variants.push(Variant { values, map, scene, sky, duration_s });
-                Ok(())
-            }
-            (_, refusals) => {
-                self.excluded += usize::from(is_excluded);
-                Err((refusals, is_excluded))
-            }
-        }
-    }
-
-    /// The sky of a variation. Each step of the space lets it change, whatever its row is: so all variations have the same.
-    fn sky(&self, source: &mut Source, story: &Story) -> Option<Sky> {
-        let own = Sky::of(story.weather.clone(), &story.changes);
-        let first = self.variants.first().map(|variant| &variant.sky);
-        let differs = first.is_some_and(|first| (own.changes() || first.changes()) && own != *first);
-        let mark = story.changes.first().map_or(&story.map.0, |change| &change.mark);
-        source.refuse_if(differs, mark, "a sky that changes is read where all variations have the same")?;
-        Some(own)
     }
 }
 

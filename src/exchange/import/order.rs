@@ -6,10 +6,10 @@ use avastra_lang::model::expr::Comparison;
 
 use super::action::{Act, ActKind, Over, Speed};
 use super::body::Body;
-use super::condition::{Waiting, is_called};
+use super::cast::{Cast, Moving, is_called};
+use super::condition::Waiting;
 use super::phases::same_moment;
 use super::said::Said;
-use super::scene::{Cast, Moving};
 use super::source::{Mark, Source};
 use super::story::Event;
 use super::trigger::{Condition, Edge, Pair, PlaceMark, Trigger, When, asks_for_less};

@@ -5,11 +5,11 @@ use avastra_lang::model::command::RATE_MPS2;
 
 use super::action::{Bounds, Dynamics, Headway, Kept, Meeting, Over, Speed, SpeedEntry, Steady};
 use super::body::Body;
+use super::cast::{Cast, Moving, speed, too_fast};
 use super::condition::Waiting;
 use super::order::is_speed;
 use super::phases::{CONTINUOUS, Told, instead_of};
 use super::said::{Piece, Said};
-use super::scene::{Cast, Moving, speed};
 use super::source::{Mark, Source};
 
 /// A shorter wait is none, s.
@@ -45,10 +45,6 @@ fn keeping(
   false => up_to(speed + bounded(pulled(too_far, faster, loses, loses_damping), gains, loses) * 20 ms, most)
 }
 ";
-
-pub fn too_fast(mps: f64) -> String {
-    format!("{mps:.1} m/s: nothing is faster than {} m/s", SPAWN_SPEED_MPS.end())
-}
 
 /// A rate of a speed of at most so much, as a player keeps to what a vehicle can, and as an order may have, m/s².
 pub fn rate_within_mps2(source: &mut Source, most_mps2: f64, rate_mps2: f64) -> f64 {

@@ -5,15 +5,14 @@ use avastra_road::LanePlace;
 
 use super::across::aside_fields;
 use super::action::{Act, ActKind, Aside, Way};
+use super::cast::{Cast, Leg, Moving, too_fast};
 use super::condition::Waiting;
 use super::order::{Sequence, is_aside, is_speed};
-use super::pace::{self, PACE, too_fast};
+use super::pace::{self, PACE};
 use super::said::Said;
-use super::scene::{Cast, Moving};
 use super::source::{Mark, Source};
 use super::story::Event;
 use super::trigger::{Condition, Edge, When};
-use super::ways::Leg;
 
 /// A distance that is to be reached is, this near to it, m, as for esmini.
 const KEPT_M: f64 = 0.1;

@@ -2,6 +2,8 @@
 
 use core::fmt::Write;
 
+use avastra_base::geometry::Vec2;
+
 /// A number as it is written, in units of its last place.
 const PLACES: f64 = 1e4;
 
@@ -123,4 +125,10 @@ impl Said {
     pub fn form(&self) -> String {
         self.shown(|figure| format!("<{}>", figure.unit))
     }
+}
+
+pub fn points_text(points: &[Vec2]) -> String {
+    let point = |point: &Vec2| format!("{{ x: {} m, y: {} m }}", number(point.x), number(point.y));
+    let points: Vec<String> = points.iter().map(point).collect();
+    format!("points: [{}]", points.join(", "))
 }

@@ -8,10 +8,45 @@ use std::rc::Rc;
 use avastra_road::Lines;
 use roxmltree::Node;
 
-use super::Refusal;
 use super::catalogue::Library;
 use super::expression;
 use super::parameter;
+
+/// The longest step of an episode, s: a scenario is one step.
+pub const DURATION_S_MAX: f64 = 600.0;
+
+/// Gives the texts of the files that a file names.
+pub trait Files {
+    /// The scenario at a path that a file of variations names.
+    ///
+    /// # Errors
+    /// Why it cannot be read.
+    fn scenario(&self, path: &str) -> Result<String, String>;
+
+    /// The map at a path that the scenario names.
+    ///
+    /// # Errors
+    /// Why it cannot be read.
+    fn map(&self, path: &str) -> Result<String, String>;
+
+    /// The `.xosc` files in a folder of catalogues: what each is called, without its ending, and its text.
+    ///
+    /// # Errors
+    /// Why they cannot be read.
+    fn catalogues(&self, folder: &str) -> Result<Vec<(String, String)>, String>;
+}
+
+/// Something that the language cannot say, or that is no OpenSCENARIO.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+pub struct Refusal {
+    /// The scenario that a file of variations names, where the line is one of that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scenario: Option<String>,
+    pub line: u32,
+    /// The name of the XML element.
+    pub element: String,
+    pub reason: String,
+}
 
 /// Letters of a reason: it may have an expression of the file in it.
 const REASON_MAX: usize = 500;

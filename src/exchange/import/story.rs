@@ -15,7 +15,7 @@ use super::body::{Body, body};
 use super::catalogue;
 use super::position::Position;
 use super::sky::{Change, Sky};
-use super::source::{Mark, Source, children, element, elements, plain};
+use super::source::{DURATION_S_MAX, Mark, Source, children, element, elements, plain};
 use super::trigger::{
     Condition, Edge, GROUPS_MAX, Trigger, When, acts_at_once, both, conditions, is_less, reduced, trigger,
 };
@@ -29,9 +29,6 @@ const PHASES_MAX: usize = 100;
 
 /// How long a scenario is played that names no time for its end, s.
 const DURATION_S: f64 = 60.0;
-
-/// The longest step of an episode, s: a scenario is one step.
-pub(super) const DURATION_S_MAX: f64 = 600.0;
 
 /// A file's scenario.
 #[derive(Debug)]

@@ -3,13 +3,13 @@
 use std::rc::Rc;
 
 use avastra_base::geometry::{Path, Vec2, wrap_angle};
-use avastra_road::LanePlace;
 
 use super::action::{Act, ActKind, Meeting, Speed, Way};
-use super::condition::{Waiting, is_called};
+use super::cast::{Cast, Leg, Moving, is_called};
+use super::condition::Waiting;
 use super::phases::same_moment;
 use super::place::{Placed, drawn};
-use super::scene::{Cast, Moving, points_text};
+use super::said::points_text;
 use super::source::{Mark, Source};
 use super::story::{Entity, Event};
 use super::trigger::{Edge, When};
@@ -22,18 +22,6 @@ const JOINED_M: f64 = 0.2;
 
 /// Headings of vertices may be so far from the direction of the way, rad: as much as a driver on a curve is beside its chord.
 const LOOKS_RAD: f64 = 0.1;
-
-/// A trajectory as a part of somebody's way.
-#[derive(Debug)]
-pub struct Leg<'a> {
-    way: &'a Way,
-    /// Where it ends on the whole way, m.
-    pub end_m: f64,
-    /// When places of the whole way are reached, m and s.
-    pub timed: Vec<(f64, f64)>,
-    /// The lane in which it ends.
-    pub lane: Option<LanePlace>,
-}
 
 /// A way as it is put together.
 struct Joined<'a> {

@@ -16,7 +16,7 @@ use super::rows::{Parameters, capital, small, unique};
 use super::said::{Figure, Piece, Said, number};
 use super::scene::{OFFSET, Other, Scene};
 use super::sky::{self, Sky};
-use super::{Imported, Variant, Whole};
+use super::whole::{Imported, Variant, Whole};
 
 /// The space of a file's variations. With one of them, it has a scenario, too. `order` names the parameters as they are listed.
 pub fn space(whole: &Whole, order: &[String], name: &str) -> Imported {
