@@ -81,9 +81,21 @@ impl DatabaseError {
 
 impl From<rusqlite::Error> for DatabaseError {
     fn from(error: rusqlite::Error) -> DatabaseError {
+        use rusqlite::Error::{
+            FromSqlConversionFailure, IntegralValueOutOfRange, InvalidColumnType, Utf8Error,
+        };
         use rusqlite::ErrorCode::{DatabaseCorrupt, NotADatabase};
+        // The tables have types: a value of another one, or a text that is none, was not written there.
+        let is_no_value = matches!(
+            error,
+            FromSqlConversionFailure(..)
+                | IntegralValueOutOfRange(..)
+                | InvalidColumnType(..)
+                | Utf8Error(..)
+        );
         match error.sqlite_error_code() {
             Some(DatabaseCorrupt | NotADatabase) => DatabaseError::Damaged { what: error.to_string() },
+            _ if is_no_value => DatabaseError::Damaged { what: error.to_string() },
             _ => DatabaseError::Sqlite(error),
         }
     }
