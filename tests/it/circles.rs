@@ -69,7 +69,7 @@ impl Sources {
 
     fn module(&mut self, inner: &ItemMod, module: &Module, file: &Path, folder: &Path) {
         let name = inner.ident.to_string();
-        let path = [&module[..], &[name.clone()]].concat();
+        let path = [&module[..], std::slice::from_ref(&name)].concat();
         match &inner.content {
             Some((_, items)) => self.items(items, path, file, &folder.join(&name)),
             None => {

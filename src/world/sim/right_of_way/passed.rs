@@ -284,7 +284,7 @@ mod tests {
             let scene = testing::crossing_of(sign, "274");
             let mut world = testing::world(&scene);
             world.put("1", -1, "2", 275.0, 5.0);
-            let this = Obstacle { body, ..world.latest().obstacle.clone() };
+            let this = Obstacle { body, ..world.latest().obstacle };
             let pose = this.outline.pose.offset(20.0, 0.0);
             let (forward, velocity_mps) = (this.forward, this.velocity_mps);
             let moved = Moved { pose, forward, lane_heading_rad: pose.heading_rad, velocity_mps };
