@@ -165,10 +165,12 @@ pub struct Temporary {
 
 impl Temporary {
     /// Makes the file under a name that nothing has, so that neither links nor files that other processes write are touched.
+    /// The first one in a folder sweeps it.
     ///
     /// # Errors
     /// If it cannot be made.
     pub fn beside(destination: &Path) -> Result<(Temporary, File)> {
+        sweep_once(folder_of(destination));
         let name = destination.file_name().ok_or_else(|| Error::other("the path has no name"))?;
         let name = name.to_string_lossy();
         loop {
@@ -219,7 +221,6 @@ impl Drop for Temporary {
 /// # Errors
 /// If it cannot be written; then nothing of it is left.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    sweep_once(folder_of(path));
     let (temporary, mut file) = Temporary::beside(path)?;
     file.write_all(bytes)?;
     // Without this, a loss of power can leave an empty file under the new name.
@@ -271,7 +272,6 @@ fn write_over(path: &Path, found: &Metadata, bytes: &[u8]) -> Result<()> {
         return Err(Error::other("it is read-only"));
     }
     let mut there = File::options().write(true).open(path)?;
-    sweep_once(folder_of(path));
     let (temporary, mut file) = Temporary::beside(path)?;
     let is_alike = found.nlink() == 1 && fchown(&file, Some(found.uid()), Some(found.gid())).is_ok();
     // Before there is anything to read in it.

@@ -217,7 +217,7 @@ struct Search<'a> {
     found: Found,
     worth: Worth,
     /// How hard the best candidate so far is.
-    best: Worth,
+    best_worth: Worth,
     replays: u32,
     /// How often what is shrunk recurs, once that was asked.
     recurrence: Option<Recurrence>,
@@ -247,8 +247,8 @@ impl<'a> Search<'a> {
             }
         };
         let worth = Worth::new(log, found, None);
-        let best = worth.clone();
-        Search { setup, wanted, log, found, worth, best, replays, recurrence: None, plays: 0 }
+        let best_worth = worth.clone();
+        Search { setup, wanted, log, found, worth, best_worth, replays, recurrence: None, plays: 0 }
     }
 
     /// How often what is shrunk recurs.
@@ -280,7 +280,7 @@ impl<'a> Search<'a> {
         purpose: For,
     ) -> Option<Worth> {
         let worth = Worth::new(&kept.log, kept.found, None);
-        let is_softer = purpose == For::Roundness && !self.best.is_no_harder_than(&worth);
+        let is_softer = purpose == For::Roundness && !self.best_worth.is_no_harder_than(&worth);
         (!is_softer && self.recurs(candidate, script, kept, purpose)).then_some(worth)
     }
 
@@ -367,7 +367,7 @@ impl<'a> Search<'a> {
     fn take(&mut self, best: &mut Candidate, candidate: Candidate, purpose: For) -> bool {
         let Some((script, worth)) = self.holds(&candidate, purpose) else { return false };
         *best = Candidate { script, ..candidate };
-        self.best = worth;
+        self.best_worth = worth;
         true
     }
 
@@ -532,7 +532,7 @@ impl<'a> Search<'a> {
                 && let Some(worth) = self.worth_of(best, &script, &kept, For::Roundness)
             {
                 best.script = script;
-                self.best = worth;
+                self.best_worth = worth;
                 return;
             }
         }

@@ -226,10 +226,7 @@ impl<'a> Cast<'a> {
         if self.is_ego(name) {
             return Some(true);
         }
-        let pose = self.moving(source, mark, name)?.placed.pose;
-        let beside = self.route.path.project(pose.position).station_m;
-        let turned_rad = wrap_angle(pose.heading_rad - self.route.path.heading_at(beside));
-        Some(turned_rad.abs() < core::f64::consts::FRAC_PI_2)
+        Some(self.turned_rad(source, mark, name)?.abs() < core::f64::consts::FRAC_PI_2)
     }
 
     /// Whether somebody begins across the ego vehicle's route, rather than along it.
@@ -237,10 +234,15 @@ impl<'a> Cast<'a> {
         if self.is_ego(name) {
             return Some(false);
         }
+        let turned_rad = self.turned_rad(source, mark, name)?;
+        Some(libm::cos(turned_rad).abs() < libm::cos(core::f64::consts::FRAC_PI_4))
+    }
+
+    /// The heading in which a road user begins, from that of the ego vehicle's route beside it, rad.
+    fn turned_rad(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<f64> {
         let pose = self.moving(source, mark, name)?.placed.pose;
         let beside = self.route.path.project(pose.position).station_m;
-        let turned_rad = wrap_angle(pose.heading_rad - self.route.path.heading_at(beside));
-        Some(libm::cos(turned_rad).abs() < libm::cos(core::f64::consts::FRAC_PI_4))
+        Some(wrap_angle(pose.heading_rad - self.route.path.heading_at(beside)))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Declared names, and suggestions for names that are not declared.
+//! Declared names, suggestions for names that are not declared, and the documentation and text of a declaration.
 
 use std::collections::BTreeMap;
 
