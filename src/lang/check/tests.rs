@@ -608,6 +608,87 @@ rule early: elapsed >= 12 s or dark
     }
 }
 
+/// Red breaks the rule, and is drawn in 16 of 20 episodes. Of those, and of all, one in four has to begin Green.
+#[test]
+fn what_is_drawn_again_keeps_its_odds() {
+    let space = space_of(&based(
+        "enum Colour = Red | Green | Blue
+odds Colour { Red => 16, Blue => 3 }
+state colour: Colour = any
+action paint(each to: Colour where to != Red) { set colour = to }
+rule no_red: colour != Red
+",
+    ));
+    let (colour, rules) = (cell(&space, "colour"), RulesInForce::by_default(&space));
+    let drawn =
+        (0..400).map(|seed| space.memory_at_start(&space.roads[0], &rules, seed).expect("two are left"));
+    let colours: Vec<usize> = drawn.map(|memory| memory.cells()[colour].variant()).collect();
+    let of = |variant: usize| colours.iter().filter(|drawn| **drawn == variant).count();
+    // Four standard deviations to each side.
+    assert!(of(0) == 0 && (66..=134).contains(&of(1)), "{} red, {} green, {} blue", of(0), of(1), of(2));
+}
+
+/// Which key the rule reads is known at the start alone.
+#[test]
+fn all_keys_that_a_rule_may_read_are_drawn_again() {
+    let base = BASE.replace("state sky: Sky -> Level = None", "state sky: Sky -> Level = any");
+    for key in ["Rain", "Fog", "Wetness"] {
+        let more = format!(
+            "state at: Sky = {key}
+action look(each to: Sky) {{ set at = to }}
+action soak(each to: Level) {{ set sky[{key}] = to }}
+rule bright: sky[at] == High
+"
+        );
+        let space = space_of(&load_files(&[("a.ava", &format!("{base}{more}"))]));
+        let (sky, rules) = (cell(&space, "sky"), RulesInForce::by_default(&space));
+        for seed in 0..10 {
+            let memory = space.memory_at_start(&space.roads[0], &rules, seed).expect("High is left");
+            let at = memory.cells()[cell(&space, "at")].variant();
+            assert_eq!(memory.cells()[sky + at].variant(), 3, "{key}, seed {seed}");
+        }
+    }
+}
+
+/// Only the world knows whether the ego vehicle is fast, so nobody says of a written scenario that it breaks the rule.
+#[test]
+fn a_scenario_is_not_refused_for_what_the_moment_decides() {
+    let space = format!(
+        "{BASE}state fast: Bool = false
+each step {{ set fast = ego.speed > 3 m/s }}
+rule only_when_fast on ahead: fast
+"
+    );
+    let scenario = "language 1
+use \"a.ava\"
+scenario s {
+  road: corner
+  start { time: Noon }
+  steps {
+    1: ahead(lane: Left) with { vehicle: BoxTruck, speed: 11.25 m/s, distance: 20.1 m }
+  }
+}
+";
+    let loaded = load_files(&[("s.ava", scenario), ("a.ava", &space)]);
+    assert!(!codes(&loaded).contains(&code::BROKEN_RULE), "{}", shown(&loaded));
+}
+
+/// After 256 proofs it is foreseen what the others take.
+#[test]
+fn a_thousand_small_proofs_are_not_too_many() {
+    let loaded = based(
+        "state n: Int = 100
+action count(each x: Int in 1 .. 40, each y: Int in 1 .. 40) { set n = x + 41 * y }
+rule some: n > 1
+rule few: n < 1900
+",
+    );
+    let space = space_of(&loaded);
+    let rows = space.rows.iter().filter(|row| row.label.starts_with("count("));
+    let open = rows.filter(|row| matches!(row.roads[0], Reach::Open(_))).count();
+    assert_eq!(open, 1600, "{}", shown(&loaded));
+}
+
 #[test]
 fn hit_and_near_name_bodies_of_ones_own() {
     let space = space_of(&based(

@@ -144,6 +144,12 @@ mod tests {
     }
 
     #[test]
+    fn where_one_range_ends_the_next_begins() {
+        let room = Room::where_holds(0.0, 3.0, vec![1.0, 2.0], |x| x <= 1.0 || x >= 2.0);
+        assert_eq!([0.0, 0.25, 0.5, 0.75].map(|share| room.at(share)), [0.0, 0.5, 2.0, 2.5].map(Some));
+    }
+
+    #[test]
     fn a_narrow_room_has_more_than_its_ends() {
         let room = Room::where_holds(0.02, 0.04, Vec::new(), |_| true);
         let drawn: Vec<f64> = (0..100).filter_map(|share| room.at(f64::from(share) / 100.0)).collect();

@@ -2,12 +2,13 @@ use std::cell::Cell;
 use std::path::Path;
 
 use super::{Plain, table, value_of};
-use crate::action::Situation;
+use crate::action::{ActionTable, Draw, Refusal, Situation};
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::check::{ReadError, load};
 use avastra_lang::model::rules::{Before, Choose, Room, RowRules, TRIES_MAX, Unsolved};
 use avastra_lang::model::{RulesInForce, Value, locals};
+use avastra_lang::syntax::{Style, render};
 
 #[test]
 fn draws_are_short_and_independent_of_each_other() {
@@ -106,6 +107,75 @@ impl Choose for ByChance {
 
     fn number(&mut self, _: usize, room: &Room) -> Option<f64> {
         room.at(rng::unit(&mut self.0))
+    }
+}
+
+/// A table of a space on Road 2 that declares this.
+fn declared(declarations: &str) -> ActionTable {
+    let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
+    let root = scenarios.join("test.ava");
+    let read = |path: &Path| match path.ends_with("test.ava") {
+        true => Ok(format!("language 1\nuse \"roads.ava\"\n{declarations}")),
+        false => std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string())),
+    };
+    let loaded = load(&root, &read).expect("it can be read");
+    let shown = loaded.diagnostics.iter().map(|found| render(found, &loaded.sources, Style::Plain));
+    ActionTable::new(
+        loaded.space.clone().unwrap_or_else(|| panic!("{}", shown.collect::<Vec<_>>().join("\n"))),
+    )
+}
+
+/// What a space says of its only row, in so many episodes.
+fn offered(table: &ActionTable, episodes: u64) -> Vec<Result<Draw, Refusal>> {
+    let memory = table.space().initial_memory(1);
+    let rules = RulesInForce::by_default(table.space());
+    let offer = |seed| {
+        let (road, surroundings) = (&table.space().roads[0], &Plain(0.0));
+        table.offer(
+            &Situation { memory: &memory, road, rules: &rules, surroundings, seed, step: 4, happened_s: &[] },
+            0,
+        )
+    };
+    (0..episodes).map(offer).collect()
+}
+
+/// What a distance may be changes where its magnitude, or the smaller of two, does.
+#[test]
+fn draws_keep_to_rules_about_magnitudes_and_the_least() {
+    for (rule, is_kept) in [
+        ("abs(distance - 60 m) >= 40 m", (|m| m <= 20.0 || m >= 100.0) as fn(f64) -> bool),
+        ("abs(distance - 60 m) <= 10 m", |m| (50.0..=70.0).contains(&m)),
+        ("min(distance, 120 m - distance) <= 20 m", |m| m <= 20.0 || m >= 100.0),
+        ("max(distance, 120 m - distance) <= 70 m", |m| (50.0..=70.0).contains(&m)),
+    ] {
+        let table = declared(&format!(
+            "action ahead(any distance: Length in 5 m .. 115 m) {{
+  spawn Sedan ahead distance {{ lane: Current, speed: 10 m/s, does: DriveAhead }}
+}}
+rule kept on ahead: {rule}
+"
+        ));
+        let draws = offered(&table, 60);
+        let metres: Vec<f64> = draws
+            .iter()
+            .map(|draw| value_of(&draw.as_ref().expect(rule).values, "distance").unwrap().number())
+            .collect();
+        assert!(metres.iter().all(|m| is_kept(*m)), "{rule}: {metres:?}");
+        let below = metres.iter().filter(|m| **m < 60.0).count();
+        assert!((15..=45).contains(&below), "{rule}: {below} of 60 below the middle");
+    }
+}
+
+/// A car may be told to change its lane, whoever appears with it.
+#[test]
+fn an_order_goes_to_who_appears_under_its_name() {
+    let car = "spawn Sedan as car ahead 40 m { lane: Current, speed: 10 m/s, does: DriveAhead }";
+    let walker = "spawn Pedestrian as walker ahead 60 m { side: Right, speed: 1 m/s, does: Walk }";
+    for both in [[car, walker], [walker, car]] {
+        let table =
+            declared(&format!("action both() {{\n{}\norder car {{ lane: Left }}\n}}\n", both.join("\n")));
+        let offer = &offered(&table, 1)[0];
+        assert!(offer.is_ok(), "{offer:?}");
     }
 }
 
