@@ -1,4 +1,4 @@
-//! Whether the ego vehicle keeps what the space requires, judged at every tick up to the first contact.
+//! Whether the ego vehicle keeps what the space requires, judged at every tick up to and including the first contact.
 //!
 //! A requirement with `within D` is breached at a tick if its condition failed at every tick of the D before it and at
 //! itself; its margin there is the largest one of these ticks. One unbroken stretch of such ticks is one breach. Nothing
@@ -225,8 +225,8 @@ impl Monitor {
         (!monitor.watches.is_empty() || !monitor.idle.is_empty()).then_some(monitor)
     }
 
-    /// Judges the moment after a tick without a contact; `step` is the one that is driven. Beside the world stand the own
-    /// bodies of road users, by their numbers.
+    /// Judges the moment after a tick, up to and including the tick of the first contact. `step` is the one that is driven;
+    /// `own_bodies` maps the numbers of road users to bodies that the space declares.
     pub fn judge(
         &mut self,
         setup: &Setup,

@@ -240,7 +240,6 @@ fn shoved(recording: &[World], met: OrientedBox) -> Option<usize> {
         way_m += (next - here).norm();
         next = here;
         let [before_mps, after_mps] = [&pair[0], &pair[1]].map(|world| world.ego().speed_mps);
-        // More than the tyres give.
         if after_mps - before_mps > SHOVE_MPS2 * DT_S {
             let own_m = before_mps * (recording.len() - index) as f64 * DT_S;
             return (own_m < way_m / 2.0).then_some(index + 1);

@@ -6,7 +6,7 @@
 //! - it was in a junction that it was not allowed to enter: at red, late at yellow, past a stop sign without having stood;
 //! - it drove into a junction across the route of the ego vehicle, which goes first there;
 //! - it stood or crept in the ego vehicle's way;
-//! - it was on foot on the carriageway, or waited at a crosswalk.
+//! - a pedestrian, an animal or a moving thing was on the carriageway, or a person waited at a crosswalk.
 //!
 //! A thing that stands beside the way is no hazard.
 //!
@@ -91,8 +91,8 @@ pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<Ons
     Some(Onset { first, conflict: conflict.unwrap_or(recording.len() - 1) })
 }
 
-/// Where the ego vehicle had to give way at a junction that it is in at the contact: the station of the line before which it
-/// had to wait (of a light, a sign, or the edge of the junction), m.
+/// The station of the line before which the ego vehicle had to wait, m: of a light, of a sign, or the edge of the junction that it
+/// is in at the contact. `None` if it had priority, if no rule for junctions decided, or if it has not passed the line.
 pub fn waiting_line_m(world: &World, contact: &Contact) -> Option<f64> {
     let at_junction = matches!(
         contact.ruling.rule,
@@ -106,6 +106,9 @@ pub fn waiting_line_m(world: &World, contact: &Contact) -> Option<f64> {
             | Rule::FromTheRight
             | Rule::SameSide
     );
+    if contact.ruling.priority == Priority::Ego || !at_junction {
+        return None;
+    }
     let (route, map) = (&world.scene().route, &world.scene().map);
     let front_m = VehicleParameters::MKZ.front_m(world.ego_station_m());
     let is_inside = |part: &&RouteLane| map.lane(part.lane).junction.is_some();
@@ -118,7 +121,7 @@ pub fn waiting_line_m(world: &World, contact: &Contact) -> Option<f64> {
     let near = |line_m: &f64| (entry.from_m - SIGNS_BEFORE_M..=entry.from_m + 1.0).contains(line_m);
     let line_m = lights.chain(signs).filter(near).fold(f64::NEG_INFINITY, f64::max);
     let line_m = if line_m.is_finite() { line_m } else { entry.from_m };
-    (contact.ruling.priority != Priority::Ego && at_junction && line_m < front_m).then_some(line_m)
+    (line_m < front_m).then_some(line_m)
 }
 
 /// Index of the last moment at which a careful driver could still stop. It had to stop before the line at which the ego vehicle

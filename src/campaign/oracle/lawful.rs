@@ -16,8 +16,8 @@ const TOLERANCE_MPS: f64 = 1.0;
 const WAITS_M: f64 = 1.5;
 /// Braking of a comfortable stop, before a crosswalk at which a person waits or before a line, m/s². Ours.
 pub const COMFORTABLE_MPS2: f64 = 3.0;
-/// From the moment when something comes into sight until full braking, s. For half of the time in which braking builds up, a
-/// driver counts as not braking.
+/// From the moment when something comes into sight until full braking, s: perception, reaction, and half of the time in which braking
+/// builds up. For the other half the driver counts as braking fully.
 const DELAY_S: f64 = CAREFUL_DELAY_S + CAREFUL_BRAKING_MPS2 / CAREFUL_JERK_MPS3 / 2.0;
 /// A careful driver that sees no farther than this keeps a car's width of it in hand, m. Ours.
 const SPARE_M: f64 = 2.0;
@@ -43,12 +43,15 @@ fn crosswalk_mps(world: &World) -> f64 {
     let front_m = VehicleParameters::MKZ.front_m(world.ego_station_m());
     let Some((begin_m, _)) = next_crosswalk(world) else { return f64::INFINITY };
     match world.obstacles().any(|obstacle| waits_at_crosswalk(world, obstacle)) {
-        true => stops_within_mps(begin_m - front_m, DELAY_S, COMFORTABLE_MPS2),
+        true => {
+            let braking_mps2 = COMFORTABLE_MPS2.min(world.conditions().friction * GRAVITY_MPS2);
+            stops_within_mps(begin_m - front_m, DELAY_S, braking_mps2)
+        }
         false => f64::INFINITY,
     }
 }
 
-/// Whether a person stands at the next crosswalk of the route, or is on it.
+/// Whether a pedestrian stands on the next crosswalk of the route, or within [`WAITS_M`] of it.
 pub fn waits_at_crosswalk(world: &World, obstacle: &Obstacle) -> bool {
     let Some((begin_m, end_m)) = next_crosswalk(world) else { return false };
     obstacle.body == Body::Pedestrian

@@ -29,8 +29,8 @@ pub struct Recurrence {
 pub const MIXED: &str = "the program is not deterministic, so this mixes its chance with the noise";
 
 impl Recurrence {
-    /// Whether it recurs: the 95 % interval of the share lies above one half. The share itself is too noisy: findings with 11
-    /// of 20 fell to 31 to 49 of 100.
+    /// Whether it recurs: the 95 % interval of the share lies above one half. The share itself is too noisy: findings that
+    /// recurred in 11 of 20 recurred in 31 to 49 of 100.
     pub fn recurs(self) -> bool {
         self.interval()[0] > 0.5
     }
@@ -38,7 +38,7 @@ impl Recurrence {
     /// Whether it recurs, in a word. `is_mixed`: a driving system that is not deterministic is never cleared.
     pub fn word(self, is_mixed: bool) -> &'static str {
         match self.interval() {
-            [low, _] if low > 0.5 => "recurs",
+            _ if self.recurs() => "recurs",
             [_, high] if high < 0.5 && !is_mixed => "rarely recurs",
             _ => "may recur",
         }

@@ -1,7 +1,7 @@
 //! The smallest scenario that still makes the same crash, or the same breach.
 //!
-//! Fewest actions first (ddmin, Zeller and Hildebrandt 2002), then fewest steps, ambient vehicles and
-//! effects, then the plainest start (noon under a clear sky) and values; all passes repeat until nothing
+//! Fewest actions first (ddmin, Zeller and Hildebrandt 2002), then fewest steps, ambient vehicles, delays
+//! and effects, then the plainest start (noon under a clear sky) and values; all passes repeat until nothing
 //! changes. Every candidate is played, and every action in it must be legal by the rules of the space. The
 //! crash is the same if the ego vehicle hits an obstacle with the same body and verb, its pre-crash type, harm, priority and
 //! the class of the verdict are the same, and the space's verdict still counts it, or still does not. A breach is the same if
@@ -208,7 +208,7 @@ enum For {
     Roundness,
 }
 
-/// What must stay, and the number of plays so far.
+/// One shrinking: what must stay, and the number of plays so far, replays included.
 struct Search<'a> {
     setup: &'a Setup,
     wanted: Wanted,

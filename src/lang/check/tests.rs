@@ -650,7 +650,7 @@ rule bright: sky[at] == High
     }
 }
 
-/// Only the world knows whether the ego vehicle is fast, so nobody says of a written scenario that it breaks the rule.
+/// Only the world knows whether the ego vehicle is fast, so `check` does not refuse the scenario.
 #[test]
 fn a_scenario_is_not_refused_for_what_the_moment_decides() {
     let space = format!(

@@ -6,9 +6,9 @@
 //! | where | rule | article |
 //! |---|---|---|
 //! | lanes of a junction | an emergency vehicle under way | 34.1 |
-//! | lanes of a junction | a red light or a late yellow one, a stop sign passed without standing | 23 |
+//! | lanes of a junction | a red light or a late yellow one, a stop sign passed without standing | signs 23, 10 |
 //! | lanes of a junction | signs, then turning left before oncoming traffic, then the right | 18, 16 |
-//! | elsewhere | a vehicle that backs up, turns round, or comes from beside the road gives way | 14, 12 |
+//! | elsewhere | a vehicle that backs up, turns round, or comes from beside the road gives way | 14, 18 |
 //! | elsewhere | a vehicle that leaves its lane gives way to one that keeps its own | 14, 11 |
 //! | one lane | a vehicle behind another keeps its distance | 13.5 |
 //!
@@ -21,7 +21,9 @@
 //! it (18.6), and one that follows keeps its distance (13.5); that both make a priority is ours. What is abrupt,
 //! UN R79 says for lane changes: more than 3 m/s² after 0.4 s, to stay the way of a second behind. So a vehicle that
 //! cuts in and stops before the one behind it has its distance back has not given way. A vehicle that waits in a
-//! junction beside the other's way and then sets out comes anew. Whoever passed a red light has not given way by being early.
+//! junction beside the other's way and then sets out comes anew. A vehicle that passed
+//! red, late yellow or its stop sign has not given way, however early it came. If that was the other vehicle, and the ego vehicle
+//! had time to brake, neither has priority.
 //!
 //! The ego vehicle has no priority over a vehicle that it has seen standing while it could brake gently for it, wherever
 //! that vehicle stands (13.1). If it stood in the ego vehicle's way, moving by a step changes nothing.

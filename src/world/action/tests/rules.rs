@@ -166,9 +166,9 @@ rule kept on ahead: {rule}
     }
 }
 
-/// A car may be told to change its lane, whoever appears with it.
+/// A pedestrian that appears in the same row, before or after the car, takes nothing from the order.
 #[test]
-fn an_order_goes_to_who_appears_under_its_name() {
+fn an_order_reaches_the_vehicle_it_names() {
     let car = "spawn Sedan as car ahead 40 m { lane: Current, speed: 10 m/s, does: DriveAhead }";
     let walker = "spawn Pedestrian as walker ahead 60 m { side: Right, speed: 1 m/s, does: Walk }";
     for both in [[car, walker], [walker, car]] {

@@ -2,7 +2,8 @@
 
 use avastra_lang::model::vocabulary::Priority;
 
-/// The rules by which priority is decided. Articles are those of the Vienna Convention on Road Traffic (1968).
+/// The rules by which priority is decided. Articles are those of the Vienna Convention on Road Traffic (1968); "of the signs" means
+/// the Convention on Road Signs and Signals of the same year.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rule {
     /// Neither came into the other's way by any of these rules.
@@ -47,9 +48,9 @@ impl Rule {
             Rule::Siren => ("siren", "an emergency vehicle under way goes first (article 34)"),
             Rule::Light => (
                 "light",
-                "a vehicle that passes a red light, or yellow though it could stop, gives way (article 23)",
+                "a vehicle that passes a red light, or yellow though it could stop, gives way (article 23 of the signs)",
             ),
-            Rule::BothLights => ("both_lights", "both passed a red light (article 23)"),
+            Rule::BothLights => ("both_lights", "both passed a red light (article 23 of the signs)"),
             Rule::StopSign => (
                 "stop_sign",
                 "a vehicle that passes its stop sign without standing gives way (article 10 of the signs)",
@@ -62,7 +63,7 @@ impl Rule {
                 ("turning", "a vehicle that turns across the road gives way to oncoming traffic (article 16)")
             }
             Rule::FromTheRight => {
-                ("from_the_right", "the vehicle that comes from the nearside goes first (article 18)")
+                ("from_the_right", "the vehicle that comes from the right goes first (article 18)")
             }
             Rule::SameSide => ("same_side", "of two from one side, the one that turns less goes first"),
             Rule::Clearing => {
@@ -70,7 +71,7 @@ impl Rule {
             }
             Rule::Backing => ("backing", "a vehicle that backs up gives way (article 14)"),
             Rule::Entering => {
-                ("entering", "a vehicle that comes from beside the road gives way (article 12)")
+                ("entering", "a vehicle that comes from beside the road gives way (articles 14 and 18)")
             }
             Rule::TurningRound => {
                 ("turning_round", "a vehicle that turns round or crosses the lanes gives way (article 14)")

@@ -23,9 +23,10 @@ const ASIDE_M: f64 = 6.0;
 const TURNS_RAD: f64 = FRAC_PI_6;
 /// A body that reaches over the border of its lane by more than this leaves it, m. Ours: drivers keep lanes no better.
 const OVER_M: f64 = 0.1;
-/// Who moves to the side so fast, m/s, and would be over a line this much later, s, leaves its lane: in bends and between lines
-/// nobody who keeps a lane does. Ours.
+/// A vehicle leaves its lane if it moves sideways faster than this, m/s, and would cross the line within [`SOON_S`]. One that keeps its
+/// lane stays below. Ours.
 const CROSSING_MPS: f64 = 0.5;
+/// How far ahead that crossing is looked for, s. Ours.
 const SOON_S: f64 = 1.0;
 
 /// How the ego vehicle and another lie beside the other's way.
@@ -137,7 +138,8 @@ impl Side {
         Some(Ruling { priority, rule, mover, time_s })
     }
 
-    /// Who has priority when the two begin to be in one lane; `None` if that is as for any two in a lane.
+    /// Who has priority when one vehicle comes into the other's lane; `None` if it left enough room or came in behind, so that
+    /// the rule for following decides.
     pub fn at_coming(&self, beyond_middle: impl FnOnce() -> Option<Ruling>, time_s: f64) -> Option<Ruling> {
         if self.is_oncoming() {
             return beyond_middle();
@@ -158,10 +160,11 @@ impl Side {
     pub fn at_contact(&self, beyond_middle: impl FnOnce() -> Option<Ruling>, time_s: f64) -> Option<Ruling> {
         let ruling = |priority, rule, mover| Ruling { priority, rule, mover, time_s };
         if self.is_oncoming() {
-            // Where the middle of the road does not decide, as in a junction, the other has priority unless it leaves its lane.
-            let by_lane = || match self.other_does {
-                Some(rule) => ruling(Priority::Ego, rule, Mover::Other),
-                None => ruling(Priority::Other, self.ego_does.unwrap_or_default(), Mover::Ego),
+            // Where the middle of the road does not decide, as in a junction, the one that leaves its lane gives way.
+            let by_lane = || match (self.ego_does, self.other_does) {
+                (_, Some(rule)) => ruling(Priority::Ego, rule, Mover::Other),
+                (Some(rule), None) => ruling(Priority::Other, rule, Mover::Ego),
+                (None, None) => ruling(Priority::None, Rule::None, Mover::Both),
             };
             return Some(beyond_middle().unwrap_or_else(by_lane));
         }

@@ -323,7 +323,7 @@ fn of_two_that_meet_the_middle_of_the_road_decides_and_then_the_lane() {
         told(Side { ego_does: leaves, ..oncoming }),
         Some((Priority::Other, Rule::LeavingLane, Mover::Ego))
     );
-    assert_eq!(told(oncoming), Some((Priority::Other, Rule::default(), Mover::Ego)));
+    assert_eq!(told(oncoming), Some((Priority::None, Rule::None, Mover::Both)));
 }
 
 #[test]
