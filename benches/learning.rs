@@ -61,12 +61,12 @@ fn measured(text: &str) -> (f64, f64) {
         })
         .collect();
     let look = observation(&mut rng);
-    let legal = Array1::from_elem(ROWS, true);
+    let mut legal = vec![true; ROWS];
     let choices: Vec<f64> = (0..REPEATS)
         .map(|_| {
             let begin = cpu_s();
             for _ in 0..200 {
-                black_box(learner.choose(&look, legal.view(), &mut rng));
+                black_box(learner.choose(&look, &mut legal, &mut rng));
             }
             (cpu_s() - begin) / 200.0
         })

@@ -8,17 +8,16 @@
 //! use avastra_base::rng::{self, Stream};
 //! use avastra_search::agent::{Kind, by_name};
 //! use avastra_search::mdp::Observation;
-//! use ndarray::Array1;
 //!
 //! let Kind::Ready(build) = by_name("random").expect("it is in the registry").kind else {
 //!     panic!("it needs no training")
 //! };
 //! // Three rows with equal odds, of which one is legal.
 //! let mut agent = build();
-//! let legal = Array1::from_vec(vec![false, true, false]);
+//! let mut legal = vec![false, true, false];
 //! let mut rng = rng::stream(1, Stream::Exploration, 0);
 //! agent.begin(7);
-//! assert_eq!(agent.choose(&Observation::zeros(), legal.view(), &mut rng), Some(1));
+//! assert_eq!(agent.choose(&Observation::zeros(), &mut legal, &mut rng), Some(1));
 //! ```
 
 pub mod mdp;

@@ -13,7 +13,7 @@ use std::sync::atomic::AtomicBool;
 
 use crate::episode;
 use crate::episode::{Choice, EpisodeLog, Moment, Play, Setup};
-use crate::run::{carry_out, choose, legal, offers, on_threads};
+use crate::run::{Offers, choose, on_threads};
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_search::agent::Agent;
@@ -171,42 +171,43 @@ fn considered(
     heaviest: &mut f64,
     seen: Option<&mut Pilot>,
 ) -> (Choice, Step) {
-    let offers = offers(agent, moment);
-    let legal = legal(&offers);
+    let mut offers = Offers::of(agent, moment);
+    let legal = offers.legal();
     let chances = agent.chances(legal.view()).expect("an estimate that tries rows out asked for them");
     let situation = Situation::of(&moment.situation.surroundings.moment());
     // Where nothing appears by itself, only what an action makes appear can be hit: no event belongs to other rows.
     let ambient = moment.setup().start.ambient;
-    let may_matter = |offer: &Offer| offer.as_ref().is_ok_and(|draw| ambient > 0 || draw.makes_appear());
-    let matters: Vec<bool> = offers.iter().map(may_matter).collect();
+    let draw = |offer: &Option<Offer>| offer.clone().and_then(Result::ok);
+    let may_matter =
+        |offer: &Option<Offer>| draw(offer).is_some_and(|draw| ambient > 0 || draw.makes_appear());
+    let matters: Vec<bool> = offers.judged().iter().map(may_matter).collect();
     let count = matters.iter().filter(|&&matters| matters).count();
     let weighed = |row: usize| {
         let cell = Cell { row, road, situation };
         let share = if matters[row] { plan.share(&cell, chances[row], count) } else { 0.0 };
         (Considered { cell, weight: weight(chances[row], share) }, share)
     };
-    for row in (0..offers.len()).filter(|&row| matters[row]) {
+    for row in (0..legal.len()).filter(|&row| matters[row]) {
         *heaviest = heaviest.max(weighed(row).0.weight);
     }
     let mut trials: Vec<(Considered, Draw)> = Vec::new();
-    for (row, offer) in offers.iter().enumerate() {
+    for (row, offer) in offers.judged().iter().enumerate() {
         // Every row draws, so that the plan for one does not shift the draws of another.
         let ticket = rng::unit(rng);
         let (considered, share) = weighed(row);
-        if let Ok(draw) = offer
-            && ticket < share
-        {
-            trials.push((considered, draw.clone()));
+        if let Some(draw) = draw(offer).filter(|_| ticket < share) {
+            trials.push((considered, draw));
         }
     }
     if let Some(pilot) = seen {
-        for row in (0..offers.len()).filter(|&row| matters[row] && chances[row] > 0.0) {
+        for row in (0..legal.len()).filter(|&row| matters[row] && chances[row] > 0.0) {
             let seen = pilot.cells.entry(weighed(row).0.cell).or_default();
             seen.moments += 1;
             seen.chance += chances[row];
         }
     }
-    let choice = carry_out(offers, legal.view(), agent, moment);
+    let row = offers.chosen_by(agent);
+    let choice = offers.choice(row);
     let chosen = match &choice {
         Choice::Act(draw) => Some(weighed(draw.row).0),
         _ => None,

@@ -8,18 +8,17 @@ use ndarray::Array1;
 use crate::episode;
 use crate::episode::{Choice, Moment};
 use avastra_base::rng;
-use avastra_base::rng::{Rng, Stream};
+use avastra_base::rng::Stream;
 use avastra_drivers::Selected;
 use avastra_drivers::external::{Attached, Program};
 use avastra_lang::model::{Reach, Road, Row, RulesInForce, Space};
 use avastra_lang::prove;
 use avastra_lang::syntax::listed;
-use avastra_search::agent::Agent;
+use avastra_search::agent::{Agent, Mask};
 use avastra_search::mdp::ProcKind;
 use avastra_world::action::{ActionTable, Offer};
 use avastra_world::sim::{Scene, Start, TrafficProfile};
 
-use crate::run::offered::Offered;
 use crate::run::settings::RunError;
 
 /// Everything that the episodes of a run or a training share.
@@ -158,73 +157,82 @@ pub fn road_named(space: &Space, name: &str) -> Result<usize, RunError> {
 /// Lets an agent choose among the offers of the moment. If no row is legal, the step passes. Returns the choice, and
 /// which rows are legal, shape `(rows,)`: all of them for an agent that does not look at the mask.
 pub fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) {
-    if agent.looks_at_mask() {
-        let offers = offers(agent, moment);
-        let legal = legal(&offers);
-        return (carry_out(offers, legal.view(), agent, moment), legal);
-    }
-    let table = &moment.setup().table;
-    let offer = |row| table.offer(moment.situation, row);
-    let all = Array1::from_elem(table.rows().len(), true);
-    if !(0..all.len()).any(|row| offer(row).is_ok()) {
-        return (Choice::Pass, all);
-    }
-    let mut rng = exploration(moment);
-    let chosen = agent.choose(moment.observation, all.view(), &mut rng);
-    (chosen.map_or(Choice::Pass, |row| Choice::of(row, offer(row))), all)
+    let mut offers = Offers::of(agent, moment);
+    let row = offers.chosen_by(agent);
+    let legal = match agent.looks_at_mask() {
+        true => offers.legal(),
+        false => Array1::from_elem(offers.rows(), true),
+    };
+    (offers.choice(row), legal)
 }
 
-/// Lets an agent choose that asks for a few rows alone. What became of the first one is noted.
-pub(crate) fn choose_only(agent: &mut dyn Agent, moment: &Moment, offered: &mut Offered) -> Choice {
-    let table = &moment.setup().table;
-    let rows = agent.only().to_vec();
-    let mut legal = Array1::from_elem(table.rows().len(), false);
-    let mut offers: Vec<(usize, Offer)> = Vec::new();
-    for row in rows {
-        let offer = table.offer(moment.situation, row);
-        if offers.is_empty() {
-            offered.note_one(table.rows().len(), row, &offer);
+/// What each row would do now. A row is judged when somebody asks for it.
+pub(crate) struct Offers<'a> {
+    moment: &'a Moment<'a>,
+    shares: Vec<f64>,
+    /// By row.
+    judged: Vec<Option<Offer>>,
+}
+
+impl<'a> Offers<'a> {
+    /// As the agent wants the values drawn.
+    pub fn of(agent: &mut dyn Agent, moment: &'a Moment<'a>) -> Offers<'a> {
+        let table = &moment.setup().table;
+        agent.weigh(&|| table.odds(moment.situation));
+        let shares = agent.draw_shares(moment.step, moment.situation.seed).to_vec();
+        Offers { moment, shares, judged: vec![None; table.rows().len()] }
+    }
+
+    /// The row that the agent chooses, from its own randomness in this step.
+    pub fn chosen_by(&mut self, agent: &mut dyn Agent) -> Option<usize> {
+        let Moment { situation, step, observation, .. } = *self.moment;
+        let mut rng = rng::stream(situation.seed, Stream::Exploration, step as u64);
+        agent.choose(observation, self, &mut rng)
+    }
+
+    /// What becomes of the step with that row.
+    pub fn choice(mut self, row: Option<usize>) -> Choice {
+        row.map_or(Choice::Pass, |row| {
+            self.is_legal(row);
+            Choice::of(row, self.judged.swap_remove(row).expect("it was judged"))
+        })
+    }
+
+    /// Which rows are legal, shape `(rows,)`.
+    pub fn legal(&mut self) -> Array1<bool> {
+        self.all().unwrap_or_else(|| Array1::from_elem(self.rows(), false))
+    }
+
+    /// What was judged, by row.
+    pub fn judged(&self) -> &[Option<Offer>] {
+        &self.judged
+    }
+}
+
+impl Mask for Offers<'_> {
+    fn is_legal(&mut self, row: usize) -> bool {
+        let Moment { situation, .. } = *self.moment;
+        let judge = || self.moment.setup().table.offer_at(situation, row, &self.shares);
+        self.judged[row].get_or_insert_with(judge).is_ok()
+    }
+
+    fn all(&mut self) -> Option<Array1<bool>> {
+        if self.judged.contains(&None) {
+            let all = self.moment.setup().table.offers_at(self.moment.situation, &self.shares);
+            self.judged = all.into_iter().map(Some).collect();
         }
-        legal[row] = offer.is_ok();
-        offers.push((row, offer));
-        if legal[row] {
-            break;
-        }
+        let legal: Array1<bool> = self.judged.iter().map(|offer| matches!(offer, Some(Ok(_)))).collect();
+        legal.iter().any(|is_legal| *is_legal).then_some(legal)
     }
-    let chosen = agent.choose(moment.observation, legal.view(), &mut exploration(moment));
-    let chosen = chosen.and_then(|row| offers.into_iter().find(|(asked, _)| *asked == row));
-    chosen.map_or(Choice::Pass, |(row, offer)| Choice::of(row, offer))
-}
 
-/// What each row would do now.
-pub(crate) fn offers(agent: &mut dyn Agent, moment: &Moment) -> Vec<Offer> {
-    agent.weigh(&|| moment.setup().table.odds(moment.situation));
-    let shares = agent.draw_shares(moment.step, moment.situation.seed);
-    moment.setup().table.offers_at(moment.situation, shares)
-}
-
-/// The agent's own randomness in this step.
-fn exploration(moment: &Moment) -> Rng {
-    rng::stream(moment.situation.seed, Stream::Exploration, moment.step as u64)
+    fn rows(&self) -> usize {
+        self.judged.len()
+    }
 }
 
 /// Which of the offers are legal, shape `(rows,)`.
 pub(crate) fn legal(offers: &[Offer]) -> Array1<bool> {
     offers.iter().map(Result::is_ok).collect()
-}
-
-/// The agent's choice among the offers.
-pub(crate) fn carry_out(
-    mut offers: Vec<Offer>,
-    legal: ndarray::ArrayView1<bool>,
-    agent: &mut dyn Agent,
-    moment: &Moment,
-) -> Choice {
-    if !legal.iter().any(|&is_legal| is_legal) {
-        return Choice::Pass;
-    }
-    let row = agent.choose(moment.observation, legal, &mut exploration(moment));
-    row.map_or(Choice::Pass, |row| Choice::of(row, offers.swap_remove(row)))
 }
 
 /// The first name that comes a second time.

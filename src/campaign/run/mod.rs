@@ -26,7 +26,7 @@ mod summary;
 mod threads;
 
 pub use arena::{Arena, choose, road_named};
-pub(crate) use arena::{carry_out, legal, offers};
+pub(crate) use arena::{Offers, legal};
 pub use columns::{Column, Values, columns};
 pub use coverage::{CoverageCell, LearningPoint};
 pub use database::{Database, FailureCount, RefusalCount, RequirementCount, Totals};

@@ -24,23 +24,17 @@ struct RowOffers {
 }
 
 impl Offered {
-    /// One step's offers, by row. Refusals are put in words once, at the end: most steps refuse most rows.
-    pub(super) fn note(&mut self, offers: &[Offer]) {
+    /// One step's offers, by row, those for which the agent asked; where only one row is `played`, that one alone. Refusals are
+    /// put in words once, at the end: most steps refuse most rows.
+    pub(super) fn note(&mut self, offers: &[Option<Offer>], played: Option<usize>) {
         self.rows.resize_with(offers.len(), RowOffers::default);
-        for (row, offer) in self.rows.iter_mut().zip(offers) {
+        let noted = self.rows.iter_mut().zip(offers).enumerate();
+        for (_, (row, offer)) in noted.filter(|(row, _)| played.is_none_or(|played| played == *row)) {
             match offer {
-                Ok(_) => row.legal += 1,
-                Err(refusal) => row.refused.push(refusal.clone()),
+                Some(Ok(_)) => row.legal += 1,
+                Some(Err(refusal)) => row.refused.push(refusal.clone()),
+                None => {}
             }
-        }
-    }
-
-    /// One step's offer of one of so many rows, where nobody asked for the others.
-    pub(super) fn note_one(&mut self, rows: usize, row: usize, offer: &Offer) {
-        self.rows.resize_with(rows, RowOffers::default);
-        match offer {
-            Ok(_) => self.rows[row].legal += 1,
-            Err(refusal) => self.rows[row].refused.push(refusal.clone()),
         }
     }
 

@@ -16,7 +16,7 @@ use avastra_lang::model::Space;
 use avastra_search::agent::{Agent, Kind, QPolicy};
 use avastra_world::action::ActionTable;
 
-use crate::run::arena::{Arena, carry_out, choose, choose_only, legal, offers};
+use crate::run::arena::{Arena, Offers, choose};
 use crate::run::gauges::Gauges;
 use crate::run::offered::Offered;
 use crate::run::profile::{traffic_of, under_test};
@@ -127,14 +127,16 @@ impl Run {
         agent.begin(setup.seed);
         let mut gauges = Gauges::default();
         let mut offered = Offered::default();
+        let own = self.planned(number).map(|(_, row)| row);
         let mut choose = |moment: &Moment| {
-            if !agent.only().is_empty() {
-                return choose_only(agent, moment, &mut offered);
+            let mut offers = Offers::of(agent, moment);
+            let row = offers.chosen_by(agent);
+            if !agent.looks_at_mask() {
+                // A run tells which rows never happened, and why, whatever its agent asks for.
+                offers.legal();
             }
-            let offers = offers(agent, moment);
-            offered.note(&offers);
-            let legal = legal(&offers);
-            carry_out(offers, legal.view(), agent, moment)
+            offered.note(offers.judged(), own);
+            offers.choice(row)
         };
         let log = self.play(number, &mut choose, &mut |world, _, contacts| gauges.note(world, contacts));
         let mut summary = EpisodeSummary::judged(&setup, number, &log);
@@ -168,13 +170,17 @@ impl Run {
     pub fn setup(&self, number: usize) -> episode::Setup {
         let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
         let block = number / self.settings.episodes as usize;
-        self.setup_of(self.plan.get(block).map_or(block, |(road, _)| *road), seed)
+        self.setup_of(self.planned(number).map_or(block, |(road, _)| road), seed)
     }
 
     /// A fresh agent for the nth episode.
     fn agent_of(&self, number: usize) -> Box<dyn Agent> {
-        let block = number / self.settings.episodes as usize;
-        (self.agent)(self.plan.get(block).map_or(0, |(_, row)| *row))
+        (self.agent)(self.planned(number).map_or(0, |(_, row)| row))
+    }
+
+    /// The road and the row that an episode of a protocol is about.
+    fn planned(&self, number: usize) -> Option<(usize, usize)> {
+        self.plan.get(number / self.settings.episodes as usize).copied()
     }
 
     /// An episode of any seed on the nth of the roads.

@@ -2,15 +2,13 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use ndarray::ArrayView1;
-
 use crate::episode;
 use crate::episode::Moment;
 use crate::run::{Arena, RunError, choose, trained_against};
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::Policy;
-use avastra_search::agent::{Agent, QPolicy, Visit};
+use avastra_search::agent::{Agent, Mask, QPolicy, Visit};
 use avastra_search::mdp::Observation;
 use avastra_world::action::ActionTable;
 
@@ -41,8 +39,8 @@ impl Agent for VisitingPolicy {
         self.policy.begin(seed);
     }
 
-    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
-        let open = self.policy.legal_rows(legal);
+    fn choose(&mut self, observation: &Observation, legal: &mut dyn Mask, rng: &mut Rng) -> Option<usize> {
+        let open = self.policy.legal_rows(legal.all()?.view());
         if let Some(best) = self.policy.greedy(observation, &open) {
             let q_values = self.policy.q_values(observation).to_vec();
             let visit = Visit { observation: observation.clone(), open, q_values, best };

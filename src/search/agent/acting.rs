@@ -1,10 +1,42 @@
 //! What an agent is.
 
-use ndarray::{Array1, ArrayView1};
+use ndarray::{Array1, ArrayView1, aview1};
 
 use crate::mdp::Observation;
 use avastra_base::rng::Rng;
 use avastra_world::action::RowOdds;
+
+/// Which rows are legal now. To judge one takes time, so that who needs a few asks for these alone.
+pub trait Mask {
+    /// Whether a row is legal.
+    fn is_legal(&mut self, row: usize) -> bool;
+
+    /// Whether each row is legal, shape `(rows,)`; `None` if none is.
+    fn all(&mut self) -> Option<Array1<bool>>;
+
+    /// The number of rows.
+    fn rows(&self) -> usize;
+
+    /// Whether any row is legal.
+    fn any(&mut self) -> bool {
+        (0..self.rows()).any(|row| self.is_legal(row))
+    }
+}
+
+/// What is known of all rows already.
+impl Mask for Vec<bool> {
+    fn is_legal(&mut self, row: usize) -> bool {
+        self[row]
+    }
+
+    fn all(&mut self) -> Option<Array1<bool>> {
+        self.contains(&true).then(|| aview1(self).to_owned())
+    }
+
+    fn rows(&self) -> usize {
+        self.len()
+    }
+}
 
 /// Chooses rows of the action table.
 pub trait Agent: Send {
@@ -14,18 +46,13 @@ pub trait Agent: Send {
     /// A step begins, in which the space gives the rows these odds.
     fn weigh(&mut self, _odds: &dyn Fn() -> Vec<RowOdds>) {}
 
-    /// The row to carry out next, or none. `legal` has shape `(rows,)`; at least one is true.
-    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize>;
+    /// The row to carry out next, or none.
+    fn choose(&mut self, observation: &Observation, legal: &mut dyn Mask, rng: &mut Rng) -> Option<usize>;
 
-    /// Whether the choice, or what is learned of it, depends on which rows are legal. If not, only the chosen row is
-    /// drawn, and all others pass for legal.
+    /// Whether the choice, or what is learned of it, depends on which rows are legal. If not, all rows pass for legal in what
+    /// it learns.
     fn looks_at_mask(&self) -> bool {
         true
-    }
-
-    /// The rows that it may choose now, the one that it wants first; none if it asks about all.
-    fn only(&self) -> &[usize] {
-        &[]
     }
 
     /// A step begins in an episode of that seed: where in their ranges the drawn values of the row shall lie, each in

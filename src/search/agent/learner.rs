@@ -12,13 +12,11 @@ pub use update::improve;
 
 use std::sync::Arc;
 
-use ndarray::ArrayView1;
-
 use crate::mdp::Observation;
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 
-use super::acting::Agent;
+use super::acting::{Agent, Mask};
 use super::checkpoint::{Reader, Writer};
 use super::choice::Rows;
 use super::exploration::ExplorationSettings;
@@ -143,8 +141,8 @@ impl Agent for Learner {
     }
 
     /// ε-greedy over the open rows.
-    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
-        let open = self.policy.open(legal);
+    fn choose(&mut self, observation: &Observation, legal: &mut dyn Mask, rng: &mut Rng) -> Option<usize> {
+        let open = self.policy.open(legal)?;
         let explores = rng::unit(rng) < self.exploration_epsilon();
         self.steps += 1;
         let row = if self.policy.quirks.explores(explores) {

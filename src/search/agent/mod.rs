@@ -41,7 +41,7 @@ mod space_filling;
 mod trainable;
 mod trajectory;
 
-pub use acting::Agent;
+pub use acting::{Agent, Mask};
 pub use checked::SettingsError;
 pub use choice::Rows;
 pub use decision::{Visit, chosen_by, distilled};

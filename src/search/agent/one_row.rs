@@ -1,11 +1,9 @@
 //! One row of the table, once: an episode of a protocol.
 
-use ndarray::ArrayView1;
-
 use crate::mdp::Observation;
 use avastra_base::rng::Rng;
 
-use super::acting::Agent;
+use super::acting::{Agent, Mask};
 
 /// Chooses its row as soon as that is legal, and nothing after that. Until then it chooses the rows that make the road users
 /// appear about whom its row is, one after another.
@@ -29,17 +27,14 @@ impl Agent for OneRow {
         self.open.clone_from(&self.rows);
     }
 
-    fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
-        let chosen = self.open.iter().position(|row| legal[*row])?;
+    fn choose(&mut self, _: &Observation, legal: &mut dyn Mask, _: &mut Rng) -> Option<usize> {
+        // Of its own row a run tells in how many steps it could be, and why not.
+        legal.is_legal(self.rows[0]);
+        let chosen = self.open.iter().position(|row| legal.is_legal(*row))?;
         let row = self.open.remove(chosen);
         if row == self.rows[0] {
             self.open.clear();
         }
         Some(row)
-    }
-
-    fn only(&self) -> &[usize] {
-        // Of its own row it wants to know why it cannot be, of the next one before it whether it can.
-        if self.open.is_empty() { &self.rows[..1] } else { &self.open }
     }
 }

@@ -11,7 +11,7 @@ use avastra_lang::model::Policy;
 use avastra_lang::model::policy::PolicyRule;
 use avastra_world::action::ActionTable;
 
-use super::acting::Agent;
+use super::acting::{Agent, Mask};
 use super::checked::SettingsError;
 use super::choice::Rows;
 use super::decision::chosen_by;
@@ -109,10 +109,13 @@ impl QPolicy {
         self.network.q_values(inputs).index_axis_move(Axis(0), 0)
     }
 
-    /// Rows to choose from, shape `(rows,)`. Rules choose among legal rows whatever the settings say.
-    pub(super) fn open(&self, legal: ArrayView1<bool>) -> Vec<bool> {
-        let masks = self.looks_at_mask();
-        self.allowed_now(legal.iter().map(|&legal| legal || !masks))
+    /// Rows to choose from, shape `(rows,)`; `None` if no row is legal. Rules choose among legal rows whatever the settings
+    /// say.
+    pub(super) fn open(&self, legal: &mut dyn Mask) -> Option<Vec<bool>> {
+        match self.looks_at_mask() {
+            true => Some(self.legal_rows(legal.all()?.view())),
+            false => legal.any().then(|| self.allowed_now(core::iter::repeat_n(true, legal.rows()))),
+        }
     }
 
     /// Rows to choose from that are legal, shape `(rows,)`.
@@ -152,8 +155,8 @@ impl Agent for QPolicy {
         self.quirks.begin();
     }
 
-    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
-        let open = self.open(legal);
+    fn choose(&mut self, observation: &Observation, legal: &mut dyn Mask, rng: &mut Rng) -> Option<usize> {
+        let open = self.open(legal)?;
         let explores = rng::unit(rng) < self.settings.exploration.evaluation_epsilon;
         let row = match &self.rules {
             _ if explores => any(&open, rng),

@@ -9,7 +9,7 @@ use avastra_base::rng;
 use avastra_base::rng::Rng;
 use avastra_world::action::RowOdds;
 
-use super::acting::Agent;
+use super::acting::{Agent, Mask};
 
 /// Draws among the legal rows by their odds, each as likely until it is told others. Actions with a rate come first: each in
 /// its part of the steps, shared by its legal rows; the rows with shares have what is left of a step.
@@ -59,7 +59,9 @@ impl Agent for MaskedRandom {
         self.odds = odds();
     }
 
-    fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
+    fn choose(&mut self, _: &Observation, legal: &mut dyn Mask, rng: &mut Rng) -> Option<usize> {
+        let legal = legal.all()?;
+        let legal = legal.view();
         if let Some(rates) = self.legal_rates(legal) {
             let mut ticket = rng::unit(rng);
             let by_rate = rates.iter().position(|chance| {
@@ -101,8 +103,8 @@ impl Agent for MaskedRandom {
 pub struct RawRandom;
 
 impl Agent for RawRandom {
-    fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
-        Some(rng::below(rng, legal.len() as u32) as usize)
+    fn choose(&mut self, _: &Observation, legal: &mut dyn Mask, rng: &mut Rng) -> Option<usize> {
+        legal.any().then(|| rng::below(rng, legal.rows() as u32) as usize)
     }
 
     fn looks_at_mask(&self) -> bool {
@@ -132,7 +134,7 @@ mod tests {
         assert_eq!(chances.to_vec(), [0.25, 0.0, 0.0, 0.75]);
         let mut seen = [0.0; 4];
         for _ in 0..4000 {
-            let row = agent.choose(&Observation::zeros(), legal.view(), &mut rng).unwrap();
+            let row = agent.choose(&Observation::zeros(), &mut legal.to_vec(), &mut rng).unwrap();
             seen[row] += 1.0 / 4000.0;
         }
         assert!(seen.iter().zip(&chances).all(|(seen, chance)| (seen - chance).abs() < 0.03), "{seen:?}");
@@ -140,12 +142,12 @@ mod tests {
         let mut equal = MaskedRandom::default();
         let [mut one, mut other] = [stream(5, Stream::Exploration, 1), stream(5, Stream::Exploration, 1)];
         for _ in 0..100 {
-            let row = equal.choose(&Observation::zeros(), legal.view(), &mut one);
+            let row = equal.choose(&Observation::zeros(), &mut legal.to_vec(), &mut one);
             assert_eq!(row, any(legal.iter(), &mut other));
         }
         // Where all that is legal has no odds, nothing happens.
         let none = Array1::from_vec(vec![false, false, true, false]);
-        assert_eq!(agent.choose(&Observation::zeros(), none.view(), &mut rng), None);
+        assert_eq!(agent.choose(&Observation::zeros(), &mut none.to_vec(), &mut rng), None);
     }
 
     #[test]
@@ -167,7 +169,7 @@ mod tests {
             assert!(chances.iter().zip(wanted).all(|(chance, wanted)| (chance - wanted).abs() < 1e-12));
             let mut seen = [0.0; 5];
             for _ in 0..20_000 {
-                if let Some(row) = agent.choose(&Observation::zeros(), legal.view(), &mut rng) {
+                if let Some(row) = agent.choose(&Observation::zeros(), &mut legal.to_vec(), &mut rng) {
                     seen[row] += 1.0 / 20_000.0;
                 }
             }

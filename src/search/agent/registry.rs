@@ -1,13 +1,12 @@
 //! Every agent by name. A new agent is a file and one entry here; the conformance
 //! tests run through all of them.
 
-use ndarray::ArrayView1;
 use serde_json::{Map, Value};
 
 use crate::mdp::Observation;
 use avastra_base::rng::Rng;
 
-use super::acting::Agent;
+use super::acting::{Agent, Mask};
 use super::checked::{SettingsError, changed};
 use super::presets::Preset;
 use super::search::{BanditSettings, ConstantSettings};
@@ -89,7 +88,7 @@ pub const REGISTRY: &[Entry] = &[
 struct Idle;
 
 impl Agent for Idle {
-    fn choose(&mut self, _: &Observation, _: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
+    fn choose(&mut self, _: &Observation, _: &mut dyn Mask, _: &mut Rng) -> Option<usize> {
         None
     }
 
@@ -146,7 +145,7 @@ mod tests {
                     let observation = Observation::zeros();
                     let choose = |step| {
                         agent.draw_shares(step, seed);
-                        agent.choose(&observation, legal.view(), &mut rng)
+                        agent.choose(&observation, &mut legal.to_vec(), &mut rng)
                     };
                     let chosen: Vec<Option<usize>> = (0..50).map(choose).collect();
                     let fits = |row: &usize| *row < ROWS && (legal[*row] || !obeys);
@@ -204,7 +203,7 @@ mod tests {
                 for step in 0..6 {
                     let mut rng = stream(seed, Stream::Exploration, step as u64);
                     let legal = Array1::from_elem(ROWS, true);
-                    chosen.push(agent.choose(&Observation::zeros(), legal.view(), &mut rng).unwrap());
+                    chosen.push(agent.choose(&Observation::zeros(), &mut legal.to_vec(), &mut rng).unwrap());
                 }
                 let mut rng = stream(9, Stream::Replay, number);
                 agent.learn(&episode(&chosen), &mut rng).unwrap();

@@ -3,13 +3,11 @@
 
 use std::sync::Arc;
 
-use ndarray::ArrayView1;
-
 use crate::mdp::Observation;
 use avastra_base::rng;
 use avastra_base::rng::Rng;
 
-use super::acting::Agent;
+use super::acting::{Agent, Mask};
 use super::q_policy::{QPolicy, best};
 use super::random::any;
 
@@ -28,8 +26,8 @@ impl Agent for Shuffled {
         self.policy.begin(seed);
     }
 
-    fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
-        let open = self.policy.open(legal);
+    fn choose(&mut self, _: &Observation, legal: &mut dyn Mask, rng: &mut Rng) -> Option<usize> {
+        let open = self.policy.open(legal)?;
         let explores = rng::unit(rng) < self.policy.settings.exploration.evaluation_epsilon;
         let row = if explores || self.states.is_empty() {
             any(&open, rng)

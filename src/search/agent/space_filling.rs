@@ -5,13 +5,11 @@
 //! part, in a random order. An episode has its own hypercubes, from its seed: so episodes stay independent of each other,
 //! and a run is the same on any number of threads.
 
-use ndarray::ArrayView1;
-
 use crate::mdp::Observation;
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 
-use super::acting::Agent;
+use super::acting::{Agent, Mask};
 
 /// Steps of one hypercube: about as many as an episode has.
 const STEPS: usize = 10;
@@ -32,7 +30,8 @@ impl Agent for SpaceFilling {
     }
 
     /// The row at the point's place among the legal ones.
-    fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
+    fn choose(&mut self, _: &Observation, legal: &mut dyn Mask, _: &mut Rng) -> Option<usize> {
+        let legal = legal.all()?;
         let rows: Vec<usize> = (0..legal.len()).filter(|&row| legal[row]).collect();
         rows.get((self.point[0] * rows.len() as f64) as usize).copied()
     }
@@ -82,9 +81,11 @@ mod tests {
         let mut seen = [0; 6];
         for step in 0..10 {
             agent.draw_shares(step, 7);
-            seen[agent.choose(&Observation::zeros(), legal.view(), &mut rng).expect("rows are legal")] += 1;
+            seen[agent
+                .choose(&Observation::zeros(), &mut legal.to_vec(), &mut rng)
+                .expect("rows are legal")] += 1;
         }
         assert_eq!(seen, [2, 0, 2, 2, 2, 2]);
-        assert_eq!(agent.choose(&Observation::zeros(), Array1::from_elem(6, false).view(), &mut rng), None);
+        assert_eq!(agent.choose(&Observation::zeros(), &mut vec![false; 6], &mut rng), None);
     }
 }

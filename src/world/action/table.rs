@@ -135,12 +135,17 @@ impl ActionTable {
         let kept = situation.surroundings.for_many();
         let surroundings = kept.as_deref().unwrap_or(situation.surroundings);
         let situation = Situation { surroundings, ..*situation };
-        (0..self.rows().len()).map(|row| Judge::new(&self.space, &situation, row).draw(shares)).collect()
+        (0..self.rows().len()).map(|row| self.offer_at(&situation, row, shares)).collect()
     }
 
     /// The offer of one row: the same as in [`ActionTable::offers`].
     pub fn offer(&self, situation: &Situation<'_>, row: usize) -> Offer {
-        Judge::new(&self.space, situation, row).draw(&[])
+        self.offer_at(situation, row, &[])
+    }
+
+    /// The offer of one row: the same as in [`ActionTable::offers_at`].
+    pub fn offer_at(&self, situation: &Situation<'_>, row: usize, shares: &[f64]) -> Offer {
+        Judge::new(&self.space, situation, row).draw(shares)
     }
 
     /// What a step without an action does: to the world, and the memory after it.

@@ -1,6 +1,6 @@
 //! Learning on problems whose answer is known.
 
-use ndarray::{Array1, Array2, array};
+use ndarray::{Array2, array};
 
 use std::sync::Arc;
 
@@ -53,10 +53,6 @@ fn sight(state: usize) -> Observation {
     let mut observation = Observation::zeros();
     observation.state[state] = 1.0;
     observation
-}
-
-fn all(rows: usize) -> Array1<bool> {
-    Array1::from_elem(rows, true)
 }
 
 fn experience(state: usize, row: usize, reward: f64, rows: usize) -> Experience {
@@ -158,7 +154,7 @@ fn on_shuffled_states_it_no_longer_knows_when() {
     let right = |mut agent: Box<dyn Agent>| {
         let chosen = |step: usize| {
             let mut rng = stream(3, Stream::Exploration, step as u64);
-            agent.choose(&sight(step % 2), all(2).view(), &mut rng).expect("rows are open") == step % 2
+            agent.choose(&sight(step % 2), &mut vec![true; 2], &mut rng).expect("rows are open") == step % 2
         };
         (0..200).map(chosen).filter(|is_right| *is_right).count()
     };
@@ -205,7 +201,7 @@ fn inverted_exploration_begins_greedy() {
     let settings = small("exploration_inverted: true");
     let mut learner = learner(settings, 8, 3);
     let mut rng = stream(1, Stream::Exploration, 0);
-    let chosen: Vec<_> = (0..20).map(|_| learner.choose(&sight(0), all(8).view(), &mut rng)).collect();
+    let chosen: Vec<_> = (0..20).map(|_| learner.choose(&sight(0), &mut vec![true; 8], &mut rng)).collect();
     assert!(chosen.iter().all(|row| *row == chosen[0]), "{chosen:?}");
 }
 
@@ -229,7 +225,7 @@ fn every_kind_of_the_algorithm_solves_a_known_problem() {
             let mut rng = stream(episode, Stream::Exploration, 0);
             let (mut state, mut steps, mut terminal) = (episode as usize % 5, Vec::new(), false);
             while steps.len() < 20 && !terminal {
-                let row = learner.choose(&sight(state), all(2).view(), &mut rng).expect("rows are open");
+                let row = learner.choose(&sight(state), &mut vec![true; 2], &mut rng).expect("rows are open");
                 let (reward, next) = corridor(state, row);
                 steps.push(experience(state, row, reward, 2));
                 terminal = next.is_none();

@@ -3,9 +3,7 @@
 
 use std::sync::Arc;
 
-use ndarray::ArrayView1;
-
-use crate::agent::acting::Agent;
+use crate::agent::acting::{Agent, Mask};
 use crate::agent::checked::{Checked, SettingsError, positive, require, unit, within};
 use crate::agent::choice::Rows;
 use crate::agent::random::any;
@@ -103,13 +101,14 @@ impl Agent for Bandit {
     }
 
     /// By the record for its share of the choices, else any legal row.
-    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
+    fn choose(&mut self, observation: &Observation, legal: &mut dyn Mask, rng: &mut Rng) -> Option<usize> {
+        let legal = legal.all()?;
         let here = situation(observation);
         let BanditSettings { record_share, prior_choices, doubt, .. } = self.settings;
         let row = if rng::unit(rng) < record_share {
-            self.saved.worth.best(here, legal, prior_choices, Doubt::Try(doubt), rng)
+            self.saved.worth.best(here, legal.view(), prior_choices, Doubt::Try(doubt), rng)
         } else {
-            any(legal, rng)
+            any(&legal, rng)
         }?;
         self.saved.steps += 1;
         self.made.push((here, row));
@@ -150,11 +149,12 @@ struct Recorded {
 }
 
 impl Agent for Recorded {
-    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
+    fn choose(&mut self, observation: &Observation, legal: &mut dyn Mask, rng: &mut Rng) -> Option<usize> {
+        let legal = legal.all()?;
         let BanditSettings { evaluation_epsilon, prior_choices, doubt, .. } = self.settings;
         if rng::unit(rng) < evaluation_epsilon {
-            return any(legal, rng);
+            return any(&legal, rng);
         }
-        self.worth.best(situation(observation), legal, prior_choices, Doubt::Avoid(doubt), rng)
+        self.worth.best(situation(observation), legal.view(), prior_choices, Doubt::Avoid(doubt), rng)
     }
 }

@@ -7,9 +7,7 @@
 
 use std::sync::Arc;
 
-use ndarray::ArrayView1;
-
-use crate::agent::acting::Agent;
+use crate::agent::acting::{Agent, Mask};
 use crate::agent::checked::{Checked, SettingsError, positive, require, within};
 use crate::agent::choice::Rows;
 use crate::agent::trainable::{Configured, Diverged, Trainable};
@@ -99,8 +97,8 @@ impl Constant {
 }
 
 /// The first row of a list that is legal.
-fn first_legal(order: &[usize], legal: ArrayView1<bool>) -> Option<usize> {
-    order.iter().copied().find(|&row| legal[row])
+fn first_legal(order: &[usize], legal: &mut dyn Mask) -> Option<usize> {
+    order.iter().copied().find(|&row| legal.is_legal(row))
 }
 
 impl Agent for Constant {
@@ -110,7 +108,7 @@ impl Agent for Constant {
         self.has_led = false;
     }
 
-    fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
+    fn choose(&mut self, _: &Observation, legal: &mut dyn Mask, _: &mut Rng) -> Option<usize> {
         let row = first_legal(&self.order, legal)?;
         self.has_led |= Some(&row) == self.order.first();
         self.saved.steps += 1;
@@ -151,7 +149,7 @@ impl Trainable for Constant {
 struct List(Vec<usize>);
 
 impl Agent for List {
-    fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
+    fn choose(&mut self, _: &Observation, legal: &mut dyn Mask, _: &mut Rng) -> Option<usize> {
         first_legal(&self.0, legal)
     }
 }
@@ -177,7 +175,7 @@ mod tests {
         let mut led = [0; 4];
         for number in 0..200 {
             search.begin(number);
-            let leader = search.choose(&Observation::zeros(), all.view(), &mut rng).unwrap();
+            let leader = search.choose(&Observation::zeros(), &mut all.to_vec(), &mut rng).unwrap();
             led[leader] += 1;
             // Row 2 crashes in every second episode, row 0 in every fourth, the others never.
             let crashes = match leader {
@@ -189,9 +187,8 @@ mod tests {
         }
         assert!(led.iter().all(|&episodes| episodes > 0) && led[2] > 80, "{led:?}");
         let mut actor = search.actor();
-        let mut choose = |legal: [bool; 4]| {
-            actor.choose(&Observation::zeros(), Array1::from_vec(legal.to_vec()).view(), &mut rng)
-        };
+        let mut choose =
+            |legal: [bool; 4]| actor.choose(&Observation::zeros(), &mut legal.to_vec(), &mut rng);
         assert_eq!(choose([true; 4]), Some(2));
         assert_eq!(choose([true, true, false, true]), Some(0));
         assert_eq!(choose([false; 4]), None);
