@@ -190,11 +190,14 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
     let (log, judgements, found) = stage.first_found(&ads);
     let Some(found) = found else {
         let name = &scenario.name;
+        let missing = match scenario.claims_a_finding() {
+            true => "has none of the collisions and breaches that it claims",
+            false => "has no counted collision",
+        };
         let message = match ads.program().filter(|program| !program.is_deterministic()) {
-            None => format!("`{name}` has no counted collision and no claimed breach that could be kept"),
+            None => format!("`{name}` {missing}"),
             Some(program) => format!(
-                "`{name}` has no counted collision and no claimed breach in this play: {} is not deterministic, so \
-                 another play may have one",
+                "`{name}` {missing} in this play: {} is not deterministic, so another play may have it",
                 program.attached().name()
             ),
         };

@@ -4,7 +4,7 @@
 use serde_json::Value;
 
 use crate::cases::{expect_snapshot, files, root};
-use crate::command::{done, last_line};
+use crate::command::{done, fails, last_line};
 
 #[test]
 fn each_part_of_a_scenario_is_made_smaller_or_plainer() {
@@ -32,6 +32,15 @@ fn what_a_breach_needs_is_kept() {
         files(format!("{out}/critical"), "ava")
     };
     let mut all = found("words", &["--with", "few_words", "--episodes", "2"]);
+    // What does not come back is not exchanged for something else.
+    let other = scratch.path().join("other.ava");
+    let text = std::fs::read_to_string(&all[0]).expect("it was written");
+    std::fs::write(&other, text.replace("expect few_words.", "expect keeps_away.")).expect("it is writable");
+    fails(
+        &["shrink", &other.display().to_string()],
+        "has none of the collisions and breaches that it claims",
+    );
+    assert!(!scratch.path().join("shrunk").exists(), "nothing is left behind");
     all.extend(found("ambient", &["--ambient", "12", "--episodes", "15"]));
     let told = shrunk(&all);
     assert!(told.contains("8 of 8 actions") && told.contains("ambient: 11"), "{told}");

@@ -81,7 +81,7 @@ impl<'a> Stage<'a> {
     }
 
     /// Plays it, and finds what it is about: the first of the counted collisions and breaches that the file claims and that
-    /// happen, or else its first counted collision.
+    /// happen; of a file that claims none, the first counted collision.
     pub fn first_found(&self, ads: &Selected) -> (EpisodeLog, Vec<Judgement>, Option<Found>) {
         let log = self.play(ads, &mut |_, _, _| {});
         let judgements = self.judge(ads, &log);
@@ -102,8 +102,10 @@ impl<'a> Stage<'a> {
             }
             _ => None,
         };
-        let first = || counted.first().copied().map(Found::Collision);
-        let found = self.scenario.claims.iter().find_map(claimed).or_else(first);
+        let found = match self.scenario.claims_a_finding() {
+            true => self.scenario.claims.iter().find_map(claimed),
+            false => counted.first().copied().map(Found::Collision),
+        };
         (log, judgements, found)
     }
 

@@ -180,6 +180,12 @@ impl Scenario {
         })
     }
 
+    /// Whether it says that somebody collides, or that a requirement is breached.
+    pub fn claims_a_finding(&self) -> bool {
+        let is_finding = |claim: &Claim| matches!(claim, Claim::Collision { .. } | Claim::Breach { .. });
+        self.claims.iter().any(is_finding)
+    }
+
     /// Whether the first of its claims about a collision or a breach is about a breach.
     pub fn is_about_a_breach(&self) -> bool {
         let is_found = |claim: &&Claim| claim.is_of_a_collision() || matches!(claim, Claim::Breach { .. });

@@ -23,16 +23,19 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
                 })
         };
         let never = |condition: &&Expr| on_all(&|known| !enclose(condition, known).may_hold());
-        let together = |known: &Known<'_>| {
-            let when: Vec<&Expr> = required.when.iter().chain([&required.condition]).collect();
-            may_hold_together(&when, known, &space.episode, || vec![Case::default()])
+        let hold = |conditions: &[&Expr], known: &Known<'_>| {
+            may_hold_together(conditions, known, &space.episode, || vec![Case::default()])
         };
+        let when: Vec<&Expr> = required.when.iter().collect();
+        let with_condition = [&when[..], &[&required.condition]].concat();
         let is_opposed = || {
             // What is asked later, or somewhere else, may hold there.
             required.until.is_none()
                 && required.after.is_none()
                 && required.unless.is_none()
-                && on_all(&|known| !together(known))
+                && on_all(&|known| !hold(&with_condition, known))
+                // A file of laws may ask for lights where there are none: `run` says that it was never asked.
+                && !on_all(&|known| !hold(&when, known))
         };
         let (message, span, why) = match required.when.iter().chain(&required.after).find(never) {
             Some(never) => ("is asked at no moment", never.span, "never holds"),
