@@ -101,8 +101,9 @@ impl Case<'_> {
         let Some(found) = found else {
             let count = plural(log.collisions.len(), "collision");
             return Err(Failure::usage(format!(
-                "`{}` has no counted collision and no claimed breach to explain with this driving system ({count} in all)",
-                scenario.name
+                "`{}` {} with this driving system ({count} in all)",
+                scenario.name,
+                stage.lack_in_words()
             )));
         };
         Ok(Case { stage, ads, log, found })

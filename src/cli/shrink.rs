@@ -190,10 +190,7 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
     let (log, judgements, found) = stage.first_found(&ads);
     let Some(found) = found else {
         let name = &scenario.name;
-        let missing = match scenario.claims_a_finding() {
-            true => "has none of the collisions and breaches that it claims",
-            false => "has no counted collision",
-        };
+        let missing = stage.lack_in_words();
         let message = match ads.program().filter(|program| !program.is_deterministic()) {
             None => format!("`{name}` {missing}"),
             Some(program) => format!(

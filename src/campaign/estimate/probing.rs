@@ -17,7 +17,7 @@ use crate::run::{Offers, choose, on_threads};
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_search::agent::Agent;
-use avastra_world::action::{Draw, Offer};
+use avastra_world::action::Draw;
 
 use crate::estimate::part::{Event, Part, PartRecord};
 use crate::estimate::plan::{Cell, Pilot, Plan, Situation, weight};
@@ -177,10 +177,8 @@ fn considered(
     let situation = Situation::of(&moment.situation.surroundings.moment());
     // Where nothing appears by itself, only what an action makes appear can be hit: no event belongs to other rows.
     let ambient = moment.setup().start.ambient;
-    let draw = |offer: &Option<Offer>| offer.clone().and_then(Result::ok);
-    let may_matter =
-        |offer: &Option<Offer>| draw(offer).is_some_and(|draw| ambient > 0 || draw.makes_appear());
-    let matters: Vec<bool> = offers.judged().iter().map(may_matter).collect();
+    let may_matter = |draw: Option<&Draw>| draw.is_some_and(|draw| ambient > 0 || draw.makes_appear());
+    let matters: Vec<bool> = offers.draws().map(may_matter).collect();
     let count = matters.iter().filter(|&&matters| matters).count();
     let weighed = |row: usize| {
         let cell = Cell { row, road, situation };
@@ -191,12 +189,12 @@ fn considered(
         *heaviest = heaviest.max(weighed(row).0.weight);
     }
     let mut trials: Vec<(Considered, Draw)> = Vec::new();
-    for (row, offer) in offers.judged().iter().enumerate() {
+    for (row, draw) in offers.draws().enumerate() {
         // Every row draws, so that the plan for one does not shift the draws of another.
         let ticket = rng::unit(rng);
         let (considered, share) = weighed(row);
-        if let Some(draw) = draw(offer).filter(|_| ticket < share) {
-            trials.push((considered, draw));
+        if let Some(draw) = draw.filter(|_| ticket < share) {
+            trials.push((considered, draw.clone()));
         }
     }
     if let Some(pilot) = seen {

@@ -16,7 +16,7 @@ use avastra_lang::prove;
 use avastra_lang::syntax::listed;
 use avastra_search::agent::{Agent, Mask};
 use avastra_search::mdp::ProcKind;
-use avastra_world::action::{ActionTable, Offer};
+use avastra_world::action::{ActionTable, Draw, Offer};
 use avastra_world::sim::{Scene, Start, TrafficProfile};
 
 use crate::run::settings::RunError;
@@ -201,6 +201,11 @@ impl<'a> Offers<'a> {
     /// Which rows are legal, shape `(rows,)`.
     pub fn legal(&mut self) -> Array1<bool> {
         self.all().unwrap_or_else(|| Array1::from_elem(self.rows(), false))
+    }
+
+    /// What was drawn, by row: nothing for a row that is refused or was not judged.
+    pub fn draws(&self) -> impl Iterator<Item = Option<&Draw>> {
+        self.judged.iter().map(|offer| offer.as_ref()?.as_ref().ok())
     }
 
     /// What was judged, by row.

@@ -131,7 +131,7 @@ impl Run {
         let mut choose = |moment: &Moment| {
             let mut offers = Offers::of(agent, moment);
             let row = offers.chosen_by(agent);
-            if !agent.looks_at_mask() {
+            if own.is_none() {
                 // A run tells which rows never happened, and why, whatever its agent asks for.
                 offers.legal();
             }

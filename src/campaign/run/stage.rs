@@ -109,6 +109,14 @@ impl<'a> Stage<'a> {
         (log, judgements, found)
     }
 
+    /// What it lacks if [`Stage::first_found`] finds nothing, in words that follow its name.
+    pub fn lack_in_words(&self) -> &'static str {
+        match self.scenario.claims_a_finding() {
+            true => "has none of the collisions and breaches that it claims",
+            false => "has no counted collision",
+        }
+    }
+
     /// Indices of the collisions that the space's verdict counts, in a log of this scenario.
     pub fn counted(&self, ads: &Selected, log: &EpisodeLog) -> Vec<usize> {
         oracle::counted_at_need(self.table.space(), log, || self.judge(ads, log))
