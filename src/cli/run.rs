@@ -406,12 +406,13 @@ fn trained_elsewhere(policy: &Policy, run: &Run) -> Option<String> {
         let vehicles = plural(settings.ambient as usize, "vehicle");
         told.push(format!("without ambient traffic, and plays among {vehicles} of it"));
     }
-    for (how, before, now) in
-        [("with", &origin.with, &settings.with), ("without", &origin.without, &settings.without)]
-    {
+    for (how, none, before, now) in [
+        ("with", "with no optional rule", &origin.with, &settings.with),
+        ("without", "with all rules", &origin.without, &settings.without),
+    ] {
         if before != now {
             let rules = |names: &[String]| match names {
-                [] => format!("{how} no rule"),
+                [] => none.to_owned(),
                 names => format!("{how} `{}`", names.join("`, `")),
             };
             told.push(format!("{}, and plays {}", rules(before), rules(now)));

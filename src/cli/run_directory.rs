@@ -198,7 +198,8 @@ pub fn resume<C: Campaign>(
 /// How a database is lost, if it is: a kill may leave an empty file before anything is in it.
 pub fn lost(database: &Path) -> Option<&'static str> {
     match std::fs::metadata(database) {
-        Err(_) => Some("missing"),
+        Err(_) if is_gone(database) => Some("missing"),
+        Err(_) => Some("a link that leads nowhere"),
         Ok(found) => (found.is_file() && found.len() == 0).then_some("empty"),
     }
 }

@@ -80,7 +80,7 @@ def disagreements(label, said):
 def main():
     avastra, names = os.path.abspath(sys.argv[1]), sys.argv[2:]
     broken = 0
-    for folder in ("first", "second"):
+    for folder in ("first", "second", "third"):
         tables = sorted(glob.glob(f"{SITUATIONS}/{folder}/labels*.csv"))
         labels = {os.path.basename(table): {row["case"]: row for row in csv.DictReader(open(table))} for table in tables}
         agree = {table: 0 for table in labels}

@@ -202,7 +202,10 @@ fn a_false_claim_to_be_deterministic_is_noticed() {
     let failed = failed.display().to_string();
     let well = tempfile::tempdir().expect("a scratch directory");
     let well = profile(well.path(), &[], "1", "");
-    for (program, is_said) in [(&config, true), (&well, false)] {
+    // One that answers otherwise in every third play is noticed, too.
+    let fickle = tempfile::tempdir().expect("a scratch directory");
+    let fickle = profile(fickle.path(), &["--misbehave", "fickle"], "1", "");
+    for (program, is_said) in [(&config, true), (&fickle, true), (&well, false)] {
         let (status, stdout, stderr) = outcome(&mut avastra(&["test", &failed, "--ads", program]));
         assert_eq!(status, 0, "{stdout}{stderr}");
         assert_eq!(stderr.contains("says that it is deterministic and is not"), is_said, "{stderr}");

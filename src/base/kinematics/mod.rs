@@ -21,6 +21,9 @@ pub const GRAVITY_MPS2: f64 = 9.80665;
 /// A road user that stands runs into nothing, and has no direction of motion.
 pub const STANDING_MPS: f64 = 0.1;
 
+/// A driver that is faster than a speed by no more than this keeps to it, m/s: as `keeps_the_limit` of the law has it.
+pub const SPEEDING_MPS: f64 = 1.0;
+
 /// A person's walking pace, m/s (5 km/h, Euro NCAP's walking adult).
 pub const WALKING_MPS: f64 = 5.0 / 3.6;
 

@@ -10,8 +10,8 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
-use avastra_lang::model::expr::{Expr, ExprKind};
-use avastra_lang::model::vocabulary::Fact;
+use avastra_lang::model::expr::ExprKind;
+use avastra_lang::model::vocabulary::{Fact, WordFact};
 use avastra_lang::model::{
     Asked, BodyWord, Facts, FnDef, Kept, Memory, NearFacts, NpcFacts, ReadyRequirement, RequirementDef,
     RequirementMemory, Sliding, SpawnFacts, WorldFacts,
@@ -151,6 +151,46 @@ struct Tally {
     held: Option<u32>,
 }
 
+/// What the conditions of the watched requirements ask about.
+struct Questions {
+    facts: Vec<Fact>,
+    words: Vec<WordFact>,
+    /// The bodies that each question about others names; all if it names none.
+    of: Vec<Vec<BodyWord>>,
+}
+
+impl Questions {
+    fn by(setup: &Setup, watches: &[Watch]) -> Questions {
+        let on = watches.iter().map(|watch| watch.required.on.clone()).filter(|on| !on.is_empty());
+        let mut asked = Questions { facts: Vec::new(), words: Vec::new(), of: on.collect() };
+        for watch in watches {
+            for expr in setup.table.space().requirements[watch.required.index].conditions() {
+                asked.facts.extend(expr.filter_map(|kind| match kind {
+                    ExprKind::Fact(fact) => Some(*fact),
+                    _ => None,
+                }));
+                asked.words.extend(expr.filter_map(|kind| match kind {
+                    ExprKind::IsWord(word, _) => Some(*word),
+                    _ => None,
+                }));
+                asked.of.extend(expr.filter_map(|kind| match kind {
+                    ExprKind::Near(_, bodies, _) => Some(bodies.clone()),
+                    _ => None,
+                }));
+            }
+        }
+        asked
+    }
+
+    /// A bit for each body that is asked about.
+    fn bodies(&self) -> u32 {
+        self.of.iter().fold(0, |all, bodies| match bodies.as_slice() {
+            [] => u32::MAX,
+            named => named.iter().fold(all, |all, body| all | 1 << body.like as u32),
+        })
+    }
+}
+
 impl Monitor {
     /// `None` where no requirement is in force.
     pub fn new(setup: &Setup) -> Option<Monitor> {
@@ -175,50 +215,18 @@ impl Monitor {
         let mut bearers: Vec<usize> = watches.iter().flat_map(|watch| of(watch).iter().copied()).collect();
         bearers.sort_unstable();
         bearers.dedup();
-        let all = watches
-            .iter()
-            .flat_map(|watch| setup.table.space().requirements[watch.required.index].conditions());
-        let all: Vec<&Expr> = all.collect();
-        let facts = all.iter().flat_map(|expr| {
-            expr.filter_map(|kind| match kind {
-                ExprKind::Fact(fact) => Some(*fact),
-                _ => None,
-            })
-        });
-        let words = || {
-            all.iter().flat_map(|expr| {
-                expr.filter_map(|kind| match kind {
-                    ExprKind::IsWord(word, _) => Some(*word),
-                    _ => None,
-                })
-            })
-        };
-        let facts: Vec<Fact> = facts.collect();
-        let some = all.iter().flat_map(|expr| {
-            expr.filter_map(|kind| match kind {
-                ExprKind::Near(_, bodies, _) => Some(bodies.clone()),
-                _ => None,
-            })
-        });
-        let on = watches.iter().map(|watch| watch.required.on.clone()).filter(|on| !on.is_empty());
-        let of: Vec<Vec<BodyWord>> = on.chain(some).collect();
-        let asks_of = of.iter().fold(0, |all, bodies| match bodies.as_slice() {
-            [] => u32::MAX,
-            named => named.iter().fold(all, |all, body| all | 1 << body.like as u32),
-        });
-        let encroachment = facts.contains(&Fact::NpcPet).then(Encroachment::default);
-        let moment = MomentParts::of(facts.iter().copied(), words());
-        let tick = WatchedParts::of(facts.iter().copied(), words());
+        let asked = Questions::by(setup, &watches);
+        let (facts, words) = (|| asked.facts.iter().copied(), || asked.words.iter().copied());
         let monitor = Monitor {
-            moment,
-            tick,
+            moment: MomentParts::of(facts(), words()),
+            tick: WatchedParts::of(facts(), words()),
             watched: Watched::default(),
-            encroachment,
+            encroachment: asked.facts.contains(&Fact::NpcPet).then(Encroachment::default),
             facts: WorldFacts::default(),
             watches,
             idle,
             bearers,
-            asks_of,
+            asks_of: asked.bodies(),
             breaches: Vec::new(),
             of_step: vec![f64::NAN; setup.table.space().requirements.len()],
         };

@@ -10,7 +10,7 @@ use avastra_base::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 use avastra_base::kinematics::STANDING_MPS;
 use avastra_lang::model::vocabulary::{Body, BodyClass};
 
-use super::shape::Shape;
+use super::shape::{ASIDE_M, Shape, TURN_RAD};
 
 /// Two who head less apart than this drive in the same direction, rad (45°); more than 180° less this: in opposite ones.
 const ALIKE_RAD: f64 = core::f64::consts::FRAC_PI_4;
@@ -30,17 +30,17 @@ const EVADES_M: f64 = 1.2;
 const IN_THE_WAY_M: f64 = 1.5;
 /// Two that came nearer by less, sideways, just were there, m. Ours.
 const COMES_M: f64 = 0.5;
-/// A vehicle that has gone aside by more than this has changed lanes, m: a little more than half of a lane. Ours.
-const CHANGES_M: f64 = 2.0;
-/// One that was slower sideways, and has not, drifts, m/s: unintended departures are tested up to 0.6 m/s, lane changes are driven
+/// A vehicle that was slower sideways, and has not changed lanes, drifts, m/s: unintended departures are tested up to 0.6 m/s, lane changes are driven
 /// at 1 m/s and more. Ours.
 const CHANGES_MPS: f64 = 1.0;
 /// What would be reached later than this is passed and not evaded, s: a driver's reaction and braking. Ours.
 const LATE_S: f64 = 2.5;
 /// A lead vehicle that has stood at so many steps has stopped, and is not stopping: two seconds. Ours.
 const STOOD_STEPS: usize = 5;
-/// One that has turned by more meanwhile drives through a bend or a junction, rad (20°). Ours.
-const EVADES_RAD: f64 = core::f64::consts::PI / 9.0;
+/// Two whose middles are no farther apart along the road are beside each other, m: half a length of either, and a gap. Ours.
+const PASSES_M: f64 = 12.0;
+/// The same across the road: a lane's width. Ours.
+const ALONGSIDE_M: f64 = 4.0;
 
 /// A pre-crash type, with its number in the typology.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -164,6 +164,8 @@ pub(super) struct Step {
     pub in_junction: bool,
     /// Where the lane leads there, as far as possible the way that the vehicle looks; without a lane, where it looks itself.
     pub lane_rad: f64,
+    /// Whether that lane runs against it.
+    pub is_against: bool,
 }
 
 impl Step {
@@ -260,7 +262,7 @@ impl Way {
         match self.shape_until(step) {
             Shape::LeftTurn if turns => Some(Manoeuvre::LeftTurn),
             Shape::RightTurn if turns => Some(Manoeuvre::RightTurn),
-            _ => (self.aside_m(0, step).abs() > CHANGES_M).then_some(Manoeuvre::LaneChange),
+            _ => (self.aside_m(0, step).abs() > ASIDE_M).then_some(Manoeuvre::LaneChange),
         }
     }
 
@@ -302,9 +304,25 @@ impl Way {
     /// Whether it leaves a place beside the lanes, or has come to one.
     fn parks(&self) -> bool {
         let is_beside = |step: &Step| step.off_road_m >= 0.0 && !step.in_junction;
-        let stood = self.steps.iter().any(|step| is_beside(step) && step.place.speed_mps() < STANDING_MPS);
+        let is_slow = |step: &Step| step.place.speed_mps() < PARKING_MPS;
         let moves = self.to().speed_mps() >= STANDING_MPS;
-        moves && (stood || is_beside(self.now()) && self.to().speed_mps() < PARKING_MPS)
+        moves && self.steps.iter().any(|step| is_beside(step) && is_slow(step))
+    }
+
+    /// Whether it was on the other side of the road beside, or just behind, a slower vehicle that goes the same way. `others`: where they were at each
+    /// step.
+    fn passes(&self, others: &[Vec<Place>]) -> bool {
+        self.steps.iter().zip(others).filter(|(step, _)| step.is_against).any(|(step, others)| {
+            let own = step.place;
+            others.iter().any(|other| {
+                let there = own.pose.to_local(other.pose.position);
+                let closing_mps = own.speed_mps() - own.pose.forward().dot(&other.velocity_mps);
+                let is_ahead = there.x < PASSES_M + LATE_S * closing_mps;
+                let is_beside = there.x > -PASSES_M && is_ahead && there.y.abs() < ALONGSIDE_M;
+                let turned_rad = wrap_angle(other.pose.heading_rad - own.pose.heading_rad).abs();
+                is_beside && turned_rad < ALIKE_RAD && closing_mps > 0.0
+            })
+        })
     }
 
     /// The step from which it moves aside before somebody in its way, too late to pass; one that turns does not. `others`: where they
@@ -313,7 +331,7 @@ impl Way {
         (0..self.steps.len()).find(|&step| {
             let own = self.steps[step].place;
             let turned_rad = wrap_angle(self.to().pose.heading_rad - own.pose.heading_rad).abs();
-            if turned_rad > EVADES_RAD {
+            if turned_rad > TURN_RAD {
                 return false;
             }
             let aside_m = self.aside_m(step, self.steps.len() - 1).abs();
@@ -354,54 +372,48 @@ pub(super) struct Before {
 impl Before {
     /// The first type that fits.
     pub fn kind(&self) -> PreCrash {
-        let (ego, other) = (self.ego.manoeuvre(), self.other.manoeuvre());
-        let turns = |to: Manoeuvre| self.in_junction && [ego, other].contains(&Some(to));
-        let (turns_left, turns_right) = (turns(Manoeuvre::LeftTurn), turns(Manoeuvre::RightTurn));
-        let either = |manoeuvring, not| if ego.is_some() { manoeuvring } else { not };
-        if self.is_wreck {
-            return PreCrash::Wreck;
-        }
-        if self.has_failed {
-            return PreCrash::VehicleFailure;
+        // Who runs into one ahead in its own lane does not do so because of a light or a sign.
+        let is_rear_end = self.is_lengthwise && self.apart_rad() < ALIKE_RAD;
+        match () {
+            () if self.is_wreck => return PreCrash::Wreck,
+            () if self.has_failed => return PreCrash::VehicleFailure,
+            () => {}
         }
         if let Some(kind) = self.loses_control() {
             return kind;
         }
-        if self.ran_red {
-            return PreCrash::RunningRedLight;
+        match () {
+            () if self.ran_red && !is_rear_end => return PreCrash::RunningRedLight,
+            () if self.ran_stop && !is_rear_end => return PreCrash::RunningStopSign,
+            () => {}
         }
-        if self.ran_stop {
-            return PreCrash::RunningStopSign;
-        }
-        if let Some(kind) = self.leaves_road() {
-            return kind;
-        }
-        match self.body {
-            Body::Animal => return either(PreCrash::AnimalWithManoeuvre, PreCrash::AnimalWithoutManoeuvre),
+        let backs = || (self.ego.backs() || self.other.backs()).then_some(PreCrash::Backing);
+        let first = self.leaves_road().or_else(|| self.by_body()).or_else(backs).or_else(|| self.evades());
+        first.unwrap_or_else(|| self.by_direction())
+    }
+
+    /// The type of a contact with what is no motor vehicle.
+    fn by_body(&self) -> Option<PreCrash> {
+        let either = |manoeuvring, not| if self.ego.manoeuvre().is_some() { manoeuvring } else { not };
+        let moved = || self.other.steps.iter().any(|step| step.place.speed_mps() > MOVES_MPS);
+        Some(match self.body {
+            Body::Animal => either(PreCrash::AnimalWithManoeuvre, PreCrash::AnimalWithoutManoeuvre),
             Body::Pedestrian => {
-                return either(PreCrash::PedestrianWithManoeuvre, PreCrash::PedestrianWithoutManoeuvre);
+                either(PreCrash::PedestrianWithManoeuvre, PreCrash::PedestrianWithoutManoeuvre)
             }
-            Body::Bicycle => {
-                return either(PreCrash::CyclistWithManoeuvre, PreCrash::CyclistWithoutManoeuvre);
-            }
-            Body::Object if self.other.steps.iter().any(|step| step.place.speed_mps() > MOVES_MPS) => {
-                return PreCrash::FallingLoad;
-            }
-            Body::Object => return either(PreCrash::ObjectWithManoeuvre, PreCrash::ObjectWithoutManoeuvre),
-            _ => {}
-        }
-        if self.ego.backs() || self.other.backs() {
-            return PreCrash::Backing;
-        }
-        if let Some(kind) = self.evades() {
-            return kind;
-        }
-        // Before a junction each looks where it comes from; along a bend those who are apart look elsewhere than where they meet.
-        let (ego_rad, other_rad) = match self.in_junction {
-            true => (self.ego.approach_rad(), self.other.approach_rad()),
-            false => (self.ego.to().pose.heading_rad, self.other.to().pose.heading_rad),
-        };
-        let apart_rad = wrap_angle(other_rad - ego_rad).abs();
+            Body::Bicycle => either(PreCrash::CyclistWithManoeuvre, PreCrash::CyclistWithoutManoeuvre),
+            Body::Object if moved() => PreCrash::FallingLoad,
+            Body::Object => either(PreCrash::ObjectWithManoeuvre, PreCrash::ObjectWithoutManoeuvre),
+            _ => return None,
+        })
+    }
+
+    /// The type of a contact of two motor vehicles, by where they came from and turned.
+    fn by_direction(&self) -> PreCrash {
+        let (ego, other) = (self.ego.manoeuvre(), self.other.manoeuvre());
+        let turns = |to: Manoeuvre| self.in_junction && [ego, other].contains(&Some(to));
+        let (turns_left, turns_right) = (turns(Manoeuvre::LeftTurn), turns(Manoeuvre::RightTurn));
+        let apart_rad = self.apart_rad();
         if apart_rad < ALIKE_RAD {
             return self.same_direction(turns_left || turns_right);
         }
@@ -410,13 +422,25 @@ impl Before {
             (true, true) if turns_left => PreCrash::LeftTurnAcrossPathSignalized,
             (true, false) if turns_left => PreCrash::LeftTurnAcrossPath,
             // One that comes over without meaning to change lanes drifts.
-            (true, _) if ego.is_some() || self.other.means_to() => PreCrash::ManoeuvreOppositeDirection,
+            (true, _) if ego.is_some() || self.other.means_to() || self.passes() => {
+                PreCrash::ManoeuvreOppositeDirection
+            }
             (true, _) => PreCrash::NoManoeuvreOppositeDirection,
             (false, true) if turns_right => PreCrash::RightTurnSignalized,
             (false, false) if turns_left || turns_right => PreCrash::TurningNonSignalized,
             (false, false) => PreCrash::StraightCrossingPaths,
             (false, true) => PreCrash::Other,
         }
+    }
+
+    /// How far apart the two head. Before a junction each looks where it comes from; along a bend those who are apart look elsewhere
+    /// than where they meet.
+    fn apart_rad(&self) -> f64 {
+        let heading_rad = |way: &Way| match self.in_junction {
+            true => way.approach_rad(),
+            false => way.to().pose.heading_rad,
+        };
+        wrap_angle(heading_rad(&self.other) - heading_rad(&self.ego)).abs()
     }
 
     /// The ways of the vehicles that keep to roads: of the ego vehicle, and of the other if it is a motor vehicle.
@@ -444,6 +468,11 @@ impl Before {
                 () => Some(PreCrash::RoadDepartureWithoutManoeuvre),
             }
         })
+    }
+
+    /// Whether one of them overtakes on the other's side of the road.
+    fn passes(&self) -> bool {
+        [&self.ego, &self.other].iter().any(|way| way.passes(&self.third))
     }
 
     fn evades(&self) -> Option<PreCrash> {
@@ -504,8 +533,13 @@ mod tests {
 
     /// On a street.
     fn way(places: &[Place]) -> Way {
-        let step =
-            |place: &Place| Step { place: *place, off_road_m: -1.5, in_junction: false, lane_rad: 0.0 };
+        let step = |place: &Place| Step {
+            place: *place,
+            off_road_m: -1.5,
+            in_junction: false,
+            lane_rad: 0.0,
+            is_against: false,
+        };
         Way { steps: places.iter().map(step).collect(), intends: None, is_known: true }
     }
 
@@ -627,8 +661,13 @@ mod tests {
 
     #[test]
     fn who_skids_leaves_the_road_backs_parks_or_evades_is_told_by_the_steps_in_between() {
-        let street =
-            Step { place: at(20.0, 0.0, 0.0, 15.0), off_road_m: -1.5, in_junction: false, lane_rad: 0.0 };
+        let street = Step {
+            place: at(20.0, 0.0, 0.0, 15.0),
+            off_road_m: -1.5,
+            in_junction: false,
+            lane_rad: 0.0,
+            is_against: false,
+        };
         assert_eq!(along(street).kind(), PreCrash::LeadSlower);
         let skewed = Pose::new(20.0, 0.0, 0.5);
         let skids = Step { place: Place { pose: skewed, ..street.place }, ..street };

@@ -7,10 +7,10 @@
 use avastra_base::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 
 /// A vehicle that has turned by more than this makes a turn, rad (20°).
-const TURN_RAD: f64 = core::f64::consts::PI / 9.0;
+pub(super) const TURN_RAD: f64 = core::f64::consts::PI / 9.0;
 /// A vehicle that has moved aside by more than this, seen along its heading before and after, changes lanes, m: a
 /// little more than half of a lane.
-const ASIDE_M: f64 = 2.0;
+pub(super) const ASIDE_M: f64 = 2.0;
 /// A vehicle that has kept less than this part of its speed is stopping.
 const KEPT_PART: f64 = 0.5;
 

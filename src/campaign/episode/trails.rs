@@ -163,13 +163,11 @@ const BESIDE_M: f64 = 1.0;
 fn step(map: &RoadMap, place: Place) -> Step {
     let Pose { position, heading_rad } = place.pose;
     let at = map.nearest(position, heading_rad, BESIDE_M);
-    let lane_rad = at.map_or(heading_rad, |at| {
-        let lane_rad = map.lane(at.lane).centre.heading_at(at.station_m);
-        let is_against = wrap_angle(lane_rad - heading_rad).abs() > core::f64::consts::FRAC_PI_2;
-        lane_rad + if is_against { core::f64::consts::PI } else { 0.0 }
-    });
+    let lane_rad = at.map_or(heading_rad, |at| map.lane(at.lane).centre.heading_at(at.station_m));
+    let is_against = wrap_angle(lane_rad - heading_rad).abs() > core::f64::consts::FRAC_PI_2;
+    let lane_rad = lane_rad + if is_against { core::f64::consts::PI } else { 0.0 };
     let in_junction = at.is_some_and(|at| map.lane(at.lane).junction.is_some());
-    Step { place, off_road_m: map.lane_room_m(position), in_junction, lane_rad }
+    Step { place, off_road_m: map.lane_room_m(position), in_junction, lane_rad, is_against }
 }
 
 /// Whether another vehicle passed a red light. One with a siren may. `ticks`: of its steps.

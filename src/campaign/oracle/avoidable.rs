@@ -42,16 +42,16 @@ use avastra_drivers::{Ads, Evasion};
 use avastra_lang::model::vocabulary::Priority;
 use avastra_lang::model::{Avoidability, EGO_ACCELERATION_MPS2_MAX};
 use avastra_world::sim::{
-    Contact, Control, DT_S, EgoMotion, FRAME_TICKS, VehicleParameters, World, pedals_for,
+    Contact, Control, DT_S, EgoMotion, FRAME_TICKS, Sensed, VehicleParameters, World, pedals_for,
 };
 
 use super::hazard::{Onset, last_chance, onset, waiting_line_m};
-use super::lawful::{COMFORTABLE_MPS2, careful_mps, lawful_mps, stops_within_mps};
+use super::lawful::{COMFORTABLE_MPS2, Minded, careful_mps, lawful_mps, stops_within_mps};
 use crate::episode::{run_into_from_behind, struck};
 
 /// A driver that is held to a speed comes near to it in about this time, s. Ours: longer than the pedal's lag.
 const CATCH_UP_S: f64 = 0.6;
-/// A driver that gives way waits this far before the line, m. Ours.
+/// A driver that gives way waits this far before the line, m, or at most this far beyond it. Ours.
 const LINE_GAP_M: f64 = 1.0;
 /// A vehicle that was run into from behind keeps its way if its middle stays this near to it, m. Ours.
 const KEEPS_M: f64 = 1.0;
@@ -365,7 +365,7 @@ impl<'a> Case<'a> {
                 return false;
             }
         }
-        self.is_clear_after(&mut world, driver, &mut |_| true)
+        self.is_clear_after(&mut world, driver, self.minded(), &mut |_| true)
     }
 
     /// The first manoeuvre that avoids the collision on the road, in words.
@@ -384,19 +384,20 @@ impl<'a> Case<'a> {
     /// Drives from the takeover on; `false` if there is a collision, or a world is not `allowed`.
     fn drive(&self, driver: &mut dyn Ads, allowed: &mut dyn FnMut(&World) -> bool) -> bool {
         let start = &self.recording[self.from];
-        let mut world = start.with_ego_at_most(lawful_mps(start));
+        let mut minded = self.minded();
+        let mut world = start.with_ego_at_most(lawful_mps(start, &minded));
         let mut sensed = world.sensed();
         if self.looks_anew {
             driver.take_over(&sensed);
         }
         for recorded in &self.recording[self.from + 1..] {
             world.sense(&mut sensed);
-            let control = self.slowed(driver.drive(&sensed), &world);
+            let control = self.slowed(driver.drive(&sensed), &world, &mut minded, &sensed);
             if self.is_hit(world.tick_recorded(&control, recorded)) || !self.is_fine(&world, allowed) {
                 return false;
             }
         }
-        self.is_clear_after(&mut world, driver, allowed)
+        self.is_clear_after(&mut world, driver, minded, allowed)
     }
 
     /// Whether nothing happens for some time after the recorded contact.
@@ -404,12 +405,13 @@ impl<'a> Case<'a> {
         &self,
         world: &mut World,
         driver: &mut (impl Ads + ?Sized),
+        mut minded: Minded,
         allowed: &mut dyn FnMut(&World) -> bool,
     ) -> bool {
         let mut sensed = world.sensed();
         for _ in 0..ticks(AFTER_S) {
             world.sense(&mut sensed);
-            let control = self.slowed(driver.drive(&sensed), world);
+            let control = self.slowed(driver.drive(&sensed), world, &mut minded, &sensed);
             if self.is_hit(world.tick(&control)) || !self.is_fine(world, allowed) {
                 return false;
             }
@@ -417,14 +419,32 @@ impl<'a> Case<'a> {
         true
     }
 
+    /// The people at crosswalks whom a driver has seen before the takeover.
+    fn minded(&self) -> Minded {
+        let mut minded = Minded::default();
+        let before = &self.recording[..=self.from];
+        if !before[0].scene().route.crosswalks_m.is_empty() {
+            let mut sensed = before[0].sensed();
+            for world in before.iter().rev().step_by(FRAME_TICKS as usize) {
+                world.sense(&mut sensed);
+                minded.notice(world, &sensed);
+            }
+        }
+        minded
+    }
+
     /// A command with which the ego vehicle goes no faster than a careful driver does here.
-    fn slowed(&self, control: Control, world: &World) -> Control {
+    fn slowed(&self, control: Control, world: &World, minded: &mut Minded, sensed: &Sensed) -> Control {
+        if world.ticks().is_multiple_of(FRAME_TICKS) {
+            minded.notice(world, sensed);
+        }
         let front_m = VehicleParameters::MKZ.front_m(world.ego_station_m());
-        let waits = self.waits_at_m.filter(|line_m| *line_m > front_m);
+        // One that has come to stand a little beyond its line waits there.
+        let waits = self.waits_at_m.filter(|line_m| *line_m + LINE_GAP_M > front_m);
         let waits_mps = waits.map_or(f64::INFINITY, |line_m| {
             stops_within_mps(line_m - front_m - LINE_GAP_M, 0.0, COMFORTABLE_MPS2)
         });
-        let most_mps = self.speed_mps_max.min(careful_mps(world)).min(waits_mps);
+        let most_mps = self.speed_mps_max.min(careful_mps(world, minded)).min(waits_mps);
         // Harder than comfortably, where the line comes up too soon for that.
         let slows_mps2 = if waits_mps <= most_mps { CAREFUL_BRAKING_MPS2 } else { COMFORTABLE_MPS2 };
         let wanted_mps2 = (most_mps - world.ego().speed_mps) / CATCH_UP_S;
@@ -578,7 +598,8 @@ mod tests {
                 waits_at_m: line.map(|ahead_m| front_m + ahead_m),
                 keeps_way: false,
             };
-            case.slowed(Control { throttle_pct: 80.0, brake_pct: 0.0, steer_rad: 0.1 }, &world)
+            let control = Control { throttle_pct: 80.0, brake_pct: 0.0, steer_rad: 0.1 };
+            case.slowed(control, &world, &mut Minded::default(), &world.sensed())
         };
         let free = held(None, f64::INFINITY);
         for tenth in 0..800 {
@@ -586,13 +607,13 @@ mod tests {
             let control = held(Some(ahead_m), f64::INFINITY);
             assert_eq!(control.steer_rad, 0.1);
             let may_mps = (2.0 * COMFORTABLE_MPS2 * (ahead_m - LINE_GAP_M).max(0.0)).sqrt();
-            let wanted_mps2 = (may_mps.min(careful_mps(&world)) - 10.0) / CATCH_UP_S;
-            let is_braking = wanted_mps2 < -COMFORTABLE_MPS2 / 2.0 && ahead_m > 0.0;
+            let wanted_mps2 = (may_mps.min(careful_mps(&world, &Minded::default())) - 10.0) / CATCH_UP_S;
+            let is_braking = wanted_mps2 < -COMFORTABLE_MPS2 / 2.0;
             assert_eq!(control.brake_pct > 0.0, is_braking, "{ahead_m} m before the line: {control:?}");
             if is_braking {
                 let (_, brake_pct) = pedals_for(wanted_mps2.max(-CAREFUL_BRAKING_MPS2));
                 assert!(control.throttle_pct == 0.0 && (control.brake_pct - brake_pct).abs() < 1e-9);
-            } else if ahead_m > 0.0 {
+            } else {
                 assert!((control.throttle_pct - pedals_for(wanted_mps2).0.min(80.0)).abs() < 1e-9);
             }
         }
@@ -615,6 +636,8 @@ mod tests {
             },
             Control { throttle_pct: 0.0, brake_pct: 90.0, steer_rad: 0.0 },
             &world,
+            &mut Minded::default(),
+            &world.sensed(),
         );
         assert_eq!(brakes.brake_pct, 90.0);
     }

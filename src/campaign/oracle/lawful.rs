@@ -5,15 +5,17 @@
 //! ("avoidable at the permitted speed").
 
 use avastra_base::kinematics::{
-    CAREFUL_BRAKING_MPS2, CAREFUL_DELAY_S, CAREFUL_JERK_MPS3, GRAVITY_MPS2, STANDING_MPS,
+    CAREFUL_BRAKING_MPS2, CAREFUL_DELAY_S, CAREFUL_JERK_MPS3, GRAVITY_MPS2, SPEEDING_MPS, STANDING_MPS,
 };
+use avastra_drivers::in_sight;
 use avastra_lang::model::vocabulary::Body;
-use avastra_world::sim::{Obstacle, SignalColour, VehicleParameters, World};
+use avastra_world::sim::{Obstacle, Sensed, SignalColour, VehicleParameters, World};
 
-/// A driver that is faster by no more than this keeps to a speed, m/s: as `keeps_the_limit` has it.
-const TOLERANCE_MPS: f64 = 1.0;
-/// A person no farther from a crosswalk waits to cross on it, m. Ours.
+/// A person no farther from a crosswalk waits to cross on it, m, and one that is farther beside the ego vehicle's strip and walks away
+/// has crossed. Ours.
 const WAITS_M: f64 = 1.5;
+/// Somebody at a crosswalk is looked for along so much of the route, m.
+const APPROACH_M: f64 = 80.0;
 /// Braking of a comfortable stop, before a crosswalk at which a person waits or before a line, m/s². Ours.
 pub const COMFORTABLE_MPS2: f64 = 3.0;
 /// From the moment when something comes into sight until full braking, s: perception, reaction, and half of the time in which braking
@@ -22,27 +24,55 @@ const DELAY_S: f64 = CAREFUL_DELAY_S + CAREFUL_BRAKING_MPS2 / CAREFUL_JERK_MPS3 
 /// A careful driver that sees no farther than this keeps a car's width of it in hand, m. Ours.
 const SPARE_M: f64 = 2.0;
 
+/// The people at crosswalks whom a careful driver has seen. It keeps them in mind where something hides them later.
+#[derive(Debug, Clone, Default)]
+pub struct Minded {
+    /// By number, as `SensedObject::id`.
+    seen: Vec<u32>,
+}
+
+impl Minded {
+    /// Notes who is in sight and waits at the next crosswalk.
+    pub fn notice(&mut self, world: &World, sensed: &Sensed) {
+        if world.scene().route.crosswalks_m.is_empty() {
+            return;
+        }
+        for object in sensed.objects.iter().filter(|object| object.body == Body::Pedestrian) {
+            let is_new = !self.seen.contains(&object.id) && in_sight(object, &sensed.conditions);
+            if is_new && world.obstacle(object.id).is_some_and(|found| waits_at_crosswalk(world, found)) {
+                self.seen.push(object.id);
+            }
+        }
+    }
+
+    /// Whether one of them is still at the next crosswalk, and has not crossed before the ego vehicle.
+    fn holds(&self, world: &World) -> bool {
+        let mut people = self.seen.iter().filter_map(|id| world.obstacle(*id));
+        people.any(|person| is_at_crosswalk(world, person) && !has_crossed(world, person))
+    }
+}
+
 /// The speed at which a careful driver goes here, m/s.
-pub fn careful_mps(world: &World) -> f64 {
+pub fn careful_mps(world: &World, minded: &Minded) -> f64 {
     let scene = world.scene();
     let limit_mps = scene.map.lane(scene.route.lane_at(world.ego_station_m()).lane).speed_limit_mps;
     let conditions = world.conditions();
     let braking_mps2 = CAREFUL_BRAKING_MPS2.min(conditions.friction * GRAVITY_MPS2);
     let sight_mps = stops_within_mps(conditions.visibility_m - SPARE_M, DELAY_S, braking_mps2);
-    limit_mps.min(sight_mps).min(crosswalk_mps(world))
+    limit_mps.min(sight_mps).min(crosswalk_mps(world, minded))
 }
 
 /// The speed that the ego vehicle has, unless it is faster than a careful driver would be.
-pub fn lawful_mps(world: &World) -> f64 {
-    let (own_mps, careful_mps) = (world.ego().speed_mps, careful_mps(world));
-    if own_mps > careful_mps + TOLERANCE_MPS { careful_mps } else { own_mps }
+pub fn lawful_mps(world: &World, minded: &Minded) -> f64 {
+    let (own_mps, careful_mps) = (world.ego().speed_mps, careful_mps(world, minded));
+    if own_mps > careful_mps + SPEEDING_MPS { careful_mps } else { own_mps }
 }
 
 /// The speed from which a driver stops for those who wait at the next crosswalk, m/s; infinite where nobody does.
-fn crosswalk_mps(world: &World) -> f64 {
+fn crosswalk_mps(world: &World, minded: &Minded) -> f64 {
     let front_m = VehicleParameters::MKZ.front_m(world.ego_station_m());
     let Some((begin_m, _)) = next_crosswalk(world) else { return f64::INFINITY };
-    match world.obstacles().any(|obstacle| waits_at_crosswalk(world, obstacle)) {
+    match minded.holds(world) {
         true => {
             let braking_mps2 = COMFORTABLE_MPS2.min(world.conditions().friction * GRAVITY_MPS2);
             stops_within_mps(begin_m - front_m, DELAY_S, braking_mps2)
@@ -53,15 +83,29 @@ fn crosswalk_mps(world: &World) -> f64 {
 
 /// Whether a pedestrian stands on the next crosswalk of the route, or within [`WAITS_M`] of it.
 pub fn waits_at_crosswalk(world: &World, obstacle: &Obstacle) -> bool {
-    let Some((begin_m, end_m)) = next_crosswalk(world) else { return false };
     obstacle.body == Body::Pedestrian
         && obstacle.velocity_mps.norm() < STANDING_MPS
-        && world.scene().crosswalk_gap_m(obstacle.outline.pose.position) <= WAITS_M
-        && {
-            let path = &world.scene().route.path;
-            let station_m = path.project_near(obstacle.outline.pose.position, begin_m, 20.0).station_m;
-            (begin_m - WAITS_M..end_m + WAITS_M).contains(&station_m)
-        }
+        && is_at_crosswalk(world, obstacle)
+}
+
+/// Whether somebody is on the next crosswalk of the route, or within [`WAITS_M`] of it.
+fn is_at_crosswalk(world: &World, obstacle: &Obstacle) -> bool {
+    let Some((begin_m, end_m)) = next_crosswalk(world) else { return false };
+    let position = obstacle.outline.pose.position;
+    world.scene().crosswalk_gap_m(position) <= WAITS_M && {
+        let station_m = world.scene().route.path.project_near(position, begin_m, 20.0).station_m;
+        (begin_m - WAITS_M..end_m + WAITS_M).contains(&station_m)
+    }
+}
+
+/// Whether somebody walks away from the strip that the ego vehicle drives on.
+fn has_crossed(world: &World, obstacle: &Obstacle) -> bool {
+    let path = &world.scene().route.path;
+    let position = obstacle.outline.pose.position;
+    let found = path.project_near(position, world.ego_station_m(), APPROACH_M);
+    let left_mps = path.pose_at(found.station_m).left().dot(&obstacle.velocity_mps);
+    let beside_m = found.offset_m.abs() - world.ego_outline().half_width_m;
+    beside_m > WAITS_M && found.offset_m * left_mps > 0.0
 }
 
 /// The next crosswalk before the front, unless a light there is green for the ego vehicle.

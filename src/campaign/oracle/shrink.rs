@@ -154,8 +154,8 @@ pub fn spare_steps(
         let acts = waiting.script.steps[step].take().is_some();
         let mut shorter = whole.clone();
         shorter.script.steps.remove(step);
-        (acts && search.holds(&waiting, For::Size).is_some())
-            || (steps > 1 && search.holds(&shorter, For::Size).is_some())
+        (acts && search.holds(&waiting, Purpose::Size).is_some())
+            || (steps > 1 && search.holds(&shorter, Purpose::Size).is_some())
     };
     (0..steps).filter(is_spare).collect()
 }
@@ -201,7 +201,7 @@ enum Wanted {
 
 /// What a candidate is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum For {
+enum Purpose {
     /// Fewer or simpler parts.
     Size,
     /// The same parts with plainer values.
@@ -265,7 +265,7 @@ impl<'a> Search<'a> {
     }
 
     /// As [`Search::keeps`], if it is worth as much. Returns its script, and how hard it is.
-    fn holds(&mut self, candidate: &Candidate, purpose: For) -> Option<(Script, Worth)> {
+    fn holds(&mut self, candidate: &Candidate, purpose: Purpose) -> Option<(Script, Worth)> {
         let (kept, script) = self.keeps(candidate, None)?;
         let worth = self.worth_of(candidate, &script, &kept, purpose)?;
         Some((script, worth))
@@ -277,28 +277,28 @@ impl<'a> Search<'a> {
         candidate: &Candidate,
         script: &Script,
         kept: &Kept,
-        purpose: For,
+        purpose: Purpose,
     ) -> Option<Worth> {
         let worth = Worth::new(&kept.log, kept.found, None);
-        let is_softer = purpose == For::Roundness && !self.best_worth.is_no_harder_than(&worth);
+        let is_softer = purpose == Purpose::Roundness && !self.best_worth.is_no_harder_than(&worth);
         (!is_softer && self.recurs(candidate, script, kept, purpose)).then_some(worth)
     }
 
     /// Whether a candidate recurs as often as it must.
-    fn recurs(&mut self, candidate: &Candidate, script: &Script, kept: &Kept, purpose: For) -> bool {
+    fn recurs(&mut self, candidate: &Candidate, script: &Script, kept: &Kept, purpose: Purpose) -> bool {
         if self.replays == 0 {
             return true;
         }
         let recurrence = self.recurrence();
         let needed = match purpose {
-            For::Size => {
+            Purpose::Size => {
                 let lowest = (recurrence.interval()[0] * f64::from(recurrence.replays)).ceil() as u32;
                 let still_recurs = |recurred: &u32| Recurrence { recurred: *recurred, ..recurrence }.recurs();
                 (lowest..=recurrence.recurred)
                     .find(|recurred| !recurrence.recurs() || still_recurs(recurred))
                     .unwrap_or(recurrence.recurred)
             }
-            For::Roundness => recurrence.recurred,
+            Purpose::Roundness => recurrence.recurred,
         };
         let setup = self.begin(candidate);
         let (holds, plays) = recurs_in(&setup, script, (&kept.log, kept.found), needed, self.replays);
@@ -364,7 +364,7 @@ impl<'a> Search<'a> {
     }
 
     /// Takes a candidate if it keeps the crash and what that is worth.
-    fn take(&mut self, best: &mut Candidate, candidate: Candidate, purpose: For) -> bool {
+    fn take(&mut self, best: &mut Candidate, candidate: Candidate, purpose: Purpose) -> bool {
         let Some((script, worth)) = self.holds(&candidate, purpose) else { return false };
         *best = Candidate { script, ..candidate };
         self.best_worth = worth;
@@ -387,7 +387,7 @@ impl<'a> Search<'a> {
                 candidate
             };
             let candidates: Vec<Candidate> = acting.chunks(size).map(without).collect();
-            let found = candidates.into_iter().any(|candidate| self.take(best, candidate, For::Size));
+            let found = candidates.into_iter().any(|candidate| self.take(best, candidate, Purpose::Size));
             if found {
                 parts = 2.max(parts - 1);
             } else if size == 1 {
@@ -404,7 +404,7 @@ impl<'a> Search<'a> {
         while step < best.script.steps.len() {
             let mut candidate = best.clone();
             candidate.script.steps.remove(step);
-            if candidate.script.steps.is_empty() || !self.take(best, candidate, For::Size) {
+            if candidate.script.steps.is_empty() || !self.take(best, candidate, Purpose::Size) {
                 step += 1;
             }
         }
@@ -416,7 +416,7 @@ impl<'a> Search<'a> {
         while fewer < best.start.ambient {
             let mut candidate = best.clone();
             candidate.start.ambient = fewer;
-            if self.take(best, candidate, For::Size) {
+            if self.take(best, candidate, Purpose::Size) {
                 return;
             }
             fewer += (best.start.ambient - fewer).div_ceil(2);
@@ -431,7 +431,7 @@ impl<'a> Search<'a> {
                 continue;
             };
             if action.trigger.take().is_some() {
-                self.take(best, candidate, For::Size);
+                self.take(best, candidate, Purpose::Size);
             }
         }
     }
@@ -451,7 +451,7 @@ impl<'a> Search<'a> {
                 let mut candidate = best.clone();
                 candidate.script.steps[step] =
                     Some(ScriptedAction { row, values: draw.values.clone(), trigger: None });
-                if self.take(best, candidate, For::Size) {
+                if self.take(best, candidate, Purpose::Size) {
                     break;
                 }
             }
@@ -474,7 +474,7 @@ impl<'a> Search<'a> {
             let Start { ego_mps, signal_phase_s, seed, ambient, traffic, .. } = best.start;
             let start = Start::drawn(space, self.setup.road(), &candidate.memory, self.setup.seed);
             candidate.start = Start { ego_mps, signal_phase_s, seed, ambient, traffic, ..start };
-            self.take(best, candidate, For::Roundness);
+            self.take(best, candidate, Purpose::Roundness);
         }
     }
 
@@ -484,7 +484,7 @@ impl<'a> Search<'a> {
         for unit_s in [10.0, 1.0] {
             let mut candidate = best.clone();
             candidate.start.signal_phase_s = (phase_s / unit_s).floor() * unit_s;
-            if candidate.start != best.start && self.take(best, candidate, For::Roundness) {
+            if candidate.start != best.start && self.take(best, candidate, Purpose::Roundness) {
                 break;
             }
         }
@@ -529,7 +529,7 @@ impl<'a> Search<'a> {
             // A value that the rules have changed is no plainer than the old one.
             let got = script.steps.get(step).and_then(Option::as_ref);
             if got.is_some_and(|got| got.values[index].1 == wanted)
-                && let Some(worth) = self.worth_of(best, &script, &kept, For::Roundness)
+                && let Some(worth) = self.worth_of(best, &script, &kept, Purpose::Roundness)
             {
                 best.script = script;
                 self.best_worth = worth;

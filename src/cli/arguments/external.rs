@@ -85,4 +85,5 @@ pub enum Misbehaviour {
     FloodStderr,
     Error,
     Forgetful,
+    Fickle,
 }

@@ -9,6 +9,7 @@
 //! | lanes of a junction | a red light or a late yellow one, a stop sign passed without standing | signs 23, 10 |
 //! | lanes of a junction | signs, then turning left before oncoming traffic, then the right | 18, 16 |
 //! | elsewhere | a vehicle that backs up, turns round, or comes from beside the road gives way | 14, 18 |
+//! | beside each other into a junction | a vehicle that turns off lets pass who goes straight on beside it | 16 |
 //! | elsewhere | a vehicle that leaves its lane gives way to one that keeps its own | 14, 11 |
 //! | one lane | a vehicle behind another keeps its distance | 13.5 |
 //!
@@ -45,7 +46,7 @@
 //! The state is kept for each road user ([`Rights`]), looked at ten times a second, and read at a contact.
 
 use avastra_base::geometry::Vec2;
-use avastra_base::kinematics::{STANDING_MPS, WALKING_MPS, stopping_m};
+use avastra_base::kinematics::{SPEEDING_MPS, STANDING_MPS, WALKING_MPS, stopping_m};
 use avastra_lang::model::vocabulary::{Body, Priority};
 use avastra_road::{LaneIndex, RoadMap};
 
@@ -62,14 +63,16 @@ mod on_foot;
 mod passed;
 mod ruling;
 mod side;
+mod turning;
 
 use crossing::{Crossing, Vehicle, cuts_across};
-use on_foot::{Strip, on_foot};
+use on_foot::{Strip, ego_leaves_road_to, on_foot};
 use side::{Side, beyond_middle};
 
 pub(super) use on_foot::light_before;
 pub(super) use passed::Passed;
 pub use ruling::{Mover, Rule, Ruling};
+pub(super) use turning::SIDEWAYS_MPS;
 
 #[cfg(test)]
 mod tests;
@@ -84,11 +87,6 @@ const APPROACH_M: f64 = 80.0;
 /// What was found holds for so long after the two have left each other's way, s. Ours: outlines that touch behind
 /// a junction do so because of what happened in it.
 const HOLDS_S: f64 = 2.0;
-/// A vehicle that moves faster than this to its side comes into another lane, m/s. Ours: less than any lane
-/// change, more than any wandering.
-pub(super) const SIDEWAYS_MPS: f64 = 0.15;
-/// An ego vehicle that is faster than the limit by more than this speeds, m/s: as `keeps_the_limit` of the law has it.
-const SPEEDING_MPS: f64 = 1.0;
 /// A pedestrian within this distance of the strip that the ego vehicle drives on is in its way, m. Ours.
 const BESIDE_M: f64 = 0.5;
 /// Farther to the side of that strip a pedestrian is on another road, m: six lanes.
@@ -160,6 +158,13 @@ struct Meeting {
     tick: u64,
     /// Whether the first of the two, which may clear the junction, waits beside the other's way.
     waits: bool,
+}
+
+impl Meeting {
+    /// Whether the first of the two left the other room, and may clear the junction.
+    fn is_clearing(&self) -> bool {
+        self.ruling.rule == Rule::Clearing
+    }
 }
 
 /// A vehicle that the ego vehicle saw standing.
@@ -322,7 +327,7 @@ impl Rights {
                 Mover::Ego => around.ego.speed_mps < STANDING_MPS,
                 Mover::Other | Mover::Both => vehicle.speed_mps < STANDING_MPS,
             };
-            if meeting.ruling.rule == Rule::Clearing && first_stands {
+            if meeting.is_clearing() && first_stands {
                 meeting.waits |= !found.is_blocked(meeting.ruling.mover, vehicle, around);
             } else if meeting.waits {
                 // It sets out again: what counts is whether the other has time for it now.
@@ -340,7 +345,9 @@ impl Rights {
         let Some(side) = side.filter(|_| shares) else { return };
         match &mut self.meeting {
             // There was time to brake gently since: from now on it is one vehicle behind another.
-            Some(meeting) if meeting.place == Place::Lane && side.is_gentle() => self.meeting = None,
+            Some(meeting) if meeting.place == Place::Lane && !meeting.is_clearing() && side.is_gentle() => {
+                self.meeting = None;
+            }
             Some(meeting) if meeting.place == Place::Lane => meeting.tick = around.tick,
             Some(_) | None if began => {
                 let ruling = side.at_coming(|| beyond_middle(this, around, None), around.time_s());
@@ -372,6 +379,10 @@ impl Rights {
         if shares {
             let known = self.meeting.filter(|_| self.shares == Some(true)).map(|meeting| meeting.ruling);
             let ruling = match known {
+                // It was beside the road, and the ego vehicle comes there.
+                Some(known) if known.rule != Rule::LeavingLane && ego_leaves_road_to(this, around) => {
+                    on_foot(this, &strip, around)
+                }
                 // The pedestrian came too late, but now the ego vehicle sees it and can stop, so it is no surprise any more.
                 Some(known) if known.priority == Priority::Ego && in_sight && strip.leaves_room(around) => {
                     Ruling { priority: Priority::None, rule: Rule::OnFoot, ..known }

@@ -43,6 +43,17 @@ pub(super) enum Course<'a> {
     Nowhere,
 }
 
+impl Course<'_> {
+    /// The path that it follows, and the station of its middle on it, m; `None` if it follows none.
+    pub fn path(&self) -> Option<(&Path, f64)> {
+        match self {
+            Course::Lanes(driver) => Some((&driver.way.path, driver.station_m)),
+            Course::Path(path, station_m) => Some((path, *station_m)),
+            Course::Nowhere => None,
+        }
+    }
+}
+
 impl<'a> Vehicle<'a> {
     /// `None` of what is no vehicle.
     pub fn of(this: &'a Obstacle, motion: &'a Motion) -> Option<Vehicle<'a>> {

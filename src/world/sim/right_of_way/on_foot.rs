@@ -1,8 +1,10 @@
 //! Pedestrians, animals and things: which come onto the carriageway or into the ego vehicle's way.
 
+use avastra_base::geometry::{Pose, Vec2};
 use avastra_base::kinematics::CAREFUL_BRAKING_MPS2;
 use avastra_lang::model::vocabulary::{Body, Priority};
 
+use super::side::OVER_M;
 use super::{APPROACH_M, Mover, Rule, Ruling, allowed_mps, can_stop};
 use crate::sim::around::Around;
 use crate::sim::ego::VehicleParameters;
@@ -56,10 +58,21 @@ pub(super) fn on_foot(this: &Obstacle, strip: &Strip, around: &Around) -> Ruling
     {
         return ruling(Priority::Other, Rule::Crosswalk);
     }
+    if ego_leaves_road_to(this, around) {
+        return Ruling { mover: Mover::Ego, ..ruling(Priority::Other, Rule::LeavingLane) };
+    }
     match strip.leaves_room(around) {
         true => ruling(Priority::None, Rule::OnFoot),
         false => ruling(Priority::Ego, Rule::SteppingOut),
     }
+}
+
+/// Whether the ego vehicle has left the road with a corner, and a body is beside the road, too.
+pub(super) fn ego_leaves_road_to(this: &Obstacle, around: &Around) -> bool {
+    let map = &around.scene.map;
+    let is_off = |at: Vec2, pose: &Pose, by_m: f64| map.nearest(at, pose.heading_rad, by_m).is_none();
+    let (pose, ego) = (&this.outline.pose, around.ego_outline);
+    is_off(pose.position, pose, 0.0) && ego.corners().iter().any(|corner| is_off(*corner, &ego.pose, OVER_M))
 }
 
 /// The colour of the light before a crosswalk of the route, which begins at a station; green if one of several is.

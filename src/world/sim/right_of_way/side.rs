@@ -1,15 +1,15 @@
 //! Two vehicles beside or behind each other, outside junctions: which of them leaves its place.
 
-use core::f64::consts::FRAC_PI_6;
-
 use avastra_base::geometry::{OrientedBox, Vec2, unit_vector};
 use avastra_base::kinematics::STANDING_MPS;
 use avastra_lang::model::vocabulary::Priority;
 use avastra_road::RoadMap;
 
 use super::crossing::{Course, Vehicle};
+use super::turning::{Body, Pair, TURNS_RAD};
 use super::{ABRUPT_MPS2, Mover, Rule, Ruling, SIDEWAYS_MPS, allowed_mps, can_stop};
 use crate::sim::around::Around;
+use crate::sim::ego::VehicleParameters;
 use crate::sim::road_user::Obstacle;
 
 /// Way behind another vehicle that may not be cut off, s at its speed (UN R79, 5.6.4.7).
@@ -19,10 +19,8 @@ const HEADWAY_S: f64 = 1.0;
 const LANE_M: f64 = 50.0;
 /// Farther to the side than this a vehicle is in no lane that matters, m.
 const ASIDE_M: f64 = 6.0;
-/// A vehicle that is more askew in its lane turns round or crosses it, rad (30°). Ours.
-const TURNS_RAD: f64 = FRAC_PI_6;
 /// A body that reaches over the border of its lane by more than this leaves it, m. Ours: drivers keep lanes no better.
-const OVER_M: f64 = 0.1;
+pub(super) const OVER_M: f64 = 0.1;
 /// A vehicle leaves its lane if it moves sideways faster than this, m/s, and would cross the line within [`SOON_S`]. One that keeps its
 /// lane stays below. Ours.
 const CROSSING_MPS: f64 = 0.5;
@@ -57,7 +55,7 @@ impl Side {
         let map = &around.scene.map;
         // The way of a vehicle that keeps to lanes; beside a trajectory, the lane that it is on or crosses.
         let (path, station_m) = match vehicle.way {
-            Course::Lanes(driver) => (&driver.way.path, driver.station_m),
+            Course::Lanes(_) => vehicle.way.path()?,
             Course::Path(..) | Course::Nowhere => {
                 let place = map.nearest(here, this.outline.pose.heading_rad, ASIDE_M)?;
                 (&map.lane(place.lane).centre, place.station_m)
@@ -96,6 +94,8 @@ impl Side {
             is_changing_lanes: vehicle.is_changing_lanes,
         };
         let ego_mps = ego.forward.dot(&around.ego_velocity_mps);
+        let [ego_does, other_does] =
+            turns_off(vehicle, around).unwrap_or_else(|| [ego_does.rule(map), other_does.rule(map)]);
         Some(Side {
             aside_m: across_m.abs() - ego_width_m - other_width_m,
             apart_m,
@@ -104,8 +104,8 @@ impl Side {
             ego_mps,
             allowed_mps: allowed_mps(ego_mps, around),
             other_mps: other.forward.dot(&this.velocity_mps),
-            ego_does: ego_does.rule(map),
-            other_does: other_does.rule(map),
+            ego_does,
+            other_does,
         })
     }
 
@@ -150,10 +150,20 @@ impl Side {
             Mover::Other => self.ego_is_ahead,
             Mover::Both => false,
         };
-        if self.is_gentle() || (self.along > 0.0 && self.apart_m > 0.0 && comes_behind) {
+        if self.along > 0.0 && self.apart_m > 0.0 && comes_behind {
             return None;
         }
-        Some(ruling)
+        match (self.is_gentle(), ruling.rule, ruling.mover) {
+            (false, ..) => Some(ruling),
+            // Who turns off before the other does not drive on ahead of it: it clears the junction.
+            (true, Rule::Turning, Mover::Ego) => {
+                Some(Ruling { priority: Priority::Ego, rule: Rule::Clearing, ..ruling })
+            }
+            (true, Rule::Turning, _) => {
+                Some(Ruling { priority: Priority::Other, rule: Rule::Clearing, ..ruling })
+            }
+            (true, ..) => None,
+        }
     }
 
     /// Who has priority in a contact of two that did not come abruptly into one lane.
@@ -189,6 +199,21 @@ impl Side {
             }
         })
     }
+}
+
+/// What each does, the ego vehicle and the other, if they are in a junction and one turns off across the other's way.
+pub(super) fn turns_off(vehicle: &Vehicle, around: &Around) -> Option<[Option<Rule>; 2]> {
+    let (route, map) = (&around.scene.route, &around.scene.map);
+    let (car, station_m) = (VehicleParameters::MKZ, around.ego_station_m);
+    let inside = [car.front_m(station_m), station_m, car.rear_m(station_m)]
+        .map(|station_m| route.lane_at(station_m))
+        .into_iter()
+        .find(|part| map.lane(part.lane).junction.is_some())?;
+    let way = vehicle.way.path()?;
+    let [ego, other] =
+        [(around.ego_outline, around.ego_velocity_mps), (&vehicle.this.outline, vehicle.this.velocity_mps)]
+            .map(|(outline, velocity_mps)| Body { position: outline.pose.position, velocity_mps });
+    Pair { map, route, inside, ego, other, way }.does()
 }
 
 /// What a vehicle does outside junctions.

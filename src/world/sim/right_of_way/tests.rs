@@ -6,7 +6,7 @@ use super::*;
 use crate::action::{Effect, SpawnRequest};
 use crate::sim::testing::{self, Heading, request};
 use crate::sim::tests::hold;
-use crate::sim::{Contact, Scene, Start, World};
+use crate::sim::{Contact, Control, Scene, Start, World};
 use avastra_lang::model::vocabulary::{LaneChoice, Then, Verb};
 
 fn inside(map: &RoadMap, road: &str) -> LaneIndex {
@@ -342,6 +342,17 @@ fn who_comes_into_a_lane_gives_way_unless_it_comes_behind_or_leaves_room() {
     assert_eq!(told(Side { apart_m: -1.0, ego_is_ahead: true, ..other }), of_other);
     assert_eq!(told(Side { along: 0.0, ..ego }), of_ego, "across the other");
     assert_eq!(told(SIDE), None, "neither comes");
+    // Who turns off in good time clears the junction, where one that changes lanes drives on ahead.
+    let room = Side { apart_m: 40.0, ..SIDE };
+    let by_rule = |side: Side| side.at_coming(|| None, 3.0).map(|of| (of.priority, of.rule, of.mover));
+    let turns = Some(Rule::Turning);
+    for (side, priority, mover) in [
+        (Side { ego_is_ahead: true, ego_does: turns, ..room }, Priority::Ego, Mover::Ego),
+        (Side { other_does: turns, ..room }, Priority::Other, Mover::Other),
+    ] {
+        assert_eq!(by_rule(side), Some((priority, Rule::Clearing, mover)));
+    }
+    assert_eq!(by_rule(Side { ego_is_ahead: true, ego_does: leaves, ..room }), None);
 }
 
 #[test]
@@ -386,4 +397,29 @@ fn who_steps_out_too_late_is_no_surprise_once_the_ego_vehicle_can_stop() {
     assert_eq!((met.priority, met.rule, met.mover), (Priority::None, Rule::OnFoot, Mover::Other));
     // Its moment is that at which the pedestrian stepped out.
     assert!(world.time_s() - met.time_s > 0.8, "{} s, {met:?}", world.time_s());
+}
+
+#[test]
+fn who_stands_beside_the_road_did_not_come_to_an_ego_vehicle_that_leaves_it() {
+    // The road ends 1.75 m beside the ego vehicle's way. It drives so far to the right.
+    let met = |person_m: f64, ego_m: f64| {
+        let mut world = testing::world(&testing::overpass(3.0));
+        let beside = SpawnRequest { offset_m: -person_m, ..request(Verb::Stand, 40.0, 1.4) };
+        world.apply(&Effect::Spawn(beside)).expect("there is room");
+        let way_m = world.ego().rear_axle.position.y - ego_m;
+        for _ in 0..400 {
+            let axle = world.ego().rear_axle;
+            let to_m = (way_m - axle.position.y).clamp(-1.0, 1.0);
+            let control = Control { steer_rad: 0.1 * to_m - 0.6 * axle.heading_rad, ..hold(&world, 10.0) };
+            if let Some(contact) = world.tick(&control).first() {
+                return Some((contact.ruling.priority, contact.ruling.rule, contact.ruling.mover));
+            }
+        }
+        None
+    };
+    let came = Some((Priority::Other, Rule::LeavingLane, Mover::Ego));
+    assert_eq!(met(2.1, 1.2), came);
+    assert_eq!(met(2.6, 1.6), came);
+    assert_eq!(met(1.5, 1.2), Some((Priority::None, Rule::OnFoot, Mover::Other)), "on the carriageway");
+    assert_eq!(met(2.6, 0.4), None);
 }
