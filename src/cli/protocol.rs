@@ -129,16 +129,18 @@ fn csv(tests: &[ProtocolTest]) -> String {
     text
 }
 
-/// The tests as JUnit XML: a contact or a breach is a failure; an action that did not happen is skipped, and so is a test whose
+/// The tests as JUnit XML: a contact or a breach is a failure, a driving system that failed an error; an action that did not happen is skipped, and so is a test whose
 /// road users crashed into each other before it could show anything.
 fn junit(suite: &str, tests: &[ProtocolTest]) -> String {
-    let failed = tests.iter().filter(|test| test.is_failed()).count();
+    let is_error = |test: &&ProtocolTest| test.ending == Some(Ending::Failed) && test.breached.is_empty();
+    let errors = tests.iter().filter(is_error).count();
+    let failed = tests.iter().filter(|test| test.is_failed()).count() - errors;
     let is_skipped = |test: &ProtocolTest| {
         !test.is_failed() && test.ending.is_none_or(|ending| ending == Ending::OthersCrashed)
     };
     let skipped = tests.iter().filter(|test| is_skipped(test)).count();
     let counts =
-        format!("tests=\"{}\" failures=\"{failed}\" errors=\"0\" skipped=\"{skipped}\"", tests.len());
+        format!("tests=\"{}\" failures=\"{failed}\" errors=\"{errors}\" skipped=\"{skipped}\"", tests.len());
     let mut text = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"avastra\" {counts}>\n  <testsuite name=\"{}\" {counts}>\n",
         in_markup(suite)
@@ -147,6 +149,7 @@ fn junit(suite: &str, tests: &[ProtocolTest]) -> String {
     for test in tests {
         let element = match test {
             _ if is_skipped(test) => Some("skipped"),
+            _ if is_error(&test) => Some("error"),
             _ if test.is_failed() => Some("failure"),
             _ => None,
         };
@@ -204,6 +207,14 @@ mod tests {
             breached: Vec::new(),
             ..test.clone()
         };
+        let died = ProtocolTest { ending: Some(Ending::Failed), others_crashed: false, ..wrecked.clone() };
+        assert!(died.is_failed());
+        let cases = junit("runs/1", &[died.clone(), test.clone()]);
+        assert!(
+            cases.contains("failures=\"1\" errors=\"1\"") && cases.contains("<error message=\"driving"),
+            "{cases}"
+        );
+        assert!(csv(&[died]).contains(",driving system failed,"));
         let tests = [test, missed, wrecked];
         let table = csv(&tests);
         let lines: Vec<&str> = table.lines().collect();

@@ -408,7 +408,7 @@ fn trained_elsewhere(policy: &Policy, run: &Run) -> Option<String> {
     }
     for (how, none, before, now) in [
         ("with", "with no optional rule", &origin.with, &settings.with),
-        ("without", "with all rules", &origin.without, &settings.without),
+        ("without", "with every standard rule", &origin.without, &settings.without),
     ] {
         if before != now {
             let rules = |names: &[String]| match names {

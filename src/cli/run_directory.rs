@@ -199,7 +199,8 @@ pub fn resume<C: Campaign>(
 pub fn lost(database: &Path) -> Option<&'static str> {
     match std::fs::metadata(database) {
         Err(_) if is_gone(database) => Some("missing"),
-        Err(_) => Some("a link that leads nowhere"),
+        Err(_) if database.is_symlink() => Some("a link that leads nowhere"),
+        Err(_) => Some("unreadable"),
         Ok(found) => (found.is_file() && found.len() == 0).then_some("empty"),
     }
 }

@@ -10,7 +10,7 @@ use crate::cases::{expect_snapshot, root};
 use crate::command::done;
 
 /// Where avastra says otherwise than every analyst, and why it does.
-const ARGUED: [(&str, &str); 3] = [
+const ARGUED: [(&str, &str); 5] = [
     (
         "i09_ball_and_child",
         "a ball that has rolled off is no road user that UN R157's driver would brake for",
@@ -20,6 +20,11 @@ const ARGUED: [(&str, &str); 3] = [
         "both passed their lights, so neither has priority, and no excuse covers the ego vehicle",
     ),
     ("r04_circulating_truck_creeps_in", "it left room to brake gently, so it had given way (article 1)"),
+    (
+        "y9_overtakes_where_ego_turns_left",
+        "who turns across the road is not overtaken there (article 11); whether the ego vehicle indicated is not known",
+    ),
+    ("z1_cuts_in_within_junction", "the one behind changes lanes and runs into the one ahead: type 22"),
 ];
 
 type Label = BTreeMap<String, String>;

@@ -156,13 +156,13 @@ struct Questions {
     facts: Vec<Fact>,
     words: Vec<WordFact>,
     /// The bodies that each question about others names; all if it names none.
-    of: Vec<Vec<BodyWord>>,
+    bodies: Vec<Vec<BodyWord>>,
 }
 
 impl Questions {
     fn by(setup: &Setup, watches: &[Watch]) -> Questions {
         let on = watches.iter().map(|watch| watch.required.on.clone()).filter(|on| !on.is_empty());
-        let mut asked = Questions { facts: Vec::new(), words: Vec::new(), of: on.collect() };
+        let mut asked = Questions { facts: Vec::new(), words: Vec::new(), bodies: on.collect() };
         for watch in watches {
             for expr in setup.table.space().requirements[watch.required.index].conditions() {
                 asked.facts.extend(expr.filter_map(|kind| match kind {
@@ -173,7 +173,7 @@ impl Questions {
                     ExprKind::IsWord(word, _) => Some(*word),
                     _ => None,
                 }));
-                asked.of.extend(expr.filter_map(|kind| match kind {
+                asked.bodies.extend(expr.filter_map(|kind| match kind {
                     ExprKind::Near(_, bodies, _) => Some(bodies.clone()),
                     _ => None,
                 }));
@@ -183,8 +183,8 @@ impl Questions {
     }
 
     /// A bit for each body that is asked about.
-    fn bodies(&self) -> u32 {
-        self.of.iter().fold(0, |all, bodies| match bodies.as_slice() {
+    fn all_bodies(&self) -> u32 {
+        self.bodies.iter().fold(0, |all, bodies| match bodies.as_slice() {
             [] => u32::MAX,
             named => named.iter().fold(all, |all, body| all | 1 << body.like as u32),
         })
@@ -215,18 +215,18 @@ impl Monitor {
         let mut bearers: Vec<usize> = watches.iter().flat_map(|watch| of(watch).iter().copied()).collect();
         bearers.sort_unstable();
         bearers.dedup();
-        let asked = Questions::by(setup, &watches);
-        let (facts, words) = (|| asked.facts.iter().copied(), || asked.words.iter().copied());
+        let questions = Questions::by(setup, &watches);
+        let (facts, words) = (|| questions.facts.iter().copied(), || questions.words.iter().copied());
         let monitor = Monitor {
             moment: MomentParts::of(facts(), words()),
             tick: WatchedParts::of(facts(), words()),
             watched: Watched::default(),
-            encroachment: asked.facts.contains(&Fact::NpcPet).then(Encroachment::default),
+            encroachment: questions.facts.contains(&Fact::NpcPet).then(Encroachment::default),
             facts: WorldFacts::default(),
             watches,
             idle,
             bearers,
-            asks_of: asked.bodies(),
+            asks_of: questions.all_bodies(),
             breaches: Vec::new(),
             of_step: vec![f64::NAN; setup.table.space().requirements.len()],
         };

@@ -37,10 +37,11 @@ const CHANGES_MPS: f64 = 1.0;
 const LATE_S: f64 = 2.5;
 /// A lead vehicle that has stood at so many steps has stopped, and is not stopping: two seconds. Ours.
 const STOOD_STEPS: usize = 5;
-/// Two whose middles are no farther apart along the road are beside each other, m: half a length of either, and a gap. Ours.
-const PASSES_M: f64 = 12.0;
-/// The same across the road: a lane's width. Ours.
-const ALONGSIDE_M: f64 = 4.0;
+/// One that overtakes is at most so far behind the other, or has it so far behind, m. Ours.
+const BEHIND_M: f64 = 30.0;
+const PASSED_M: f64 = 12.0;
+/// One that is overtaken is no farther aside, m. Ours.
+const LANE_M: f64 = 4.0;
 
 /// A pre-crash type, with its number in the typology.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -251,6 +252,14 @@ impl Way {
         before.unwrap_or(&self.steps[0]).place.pose.heading_rad
     }
 
+    /// Its heading before the last junction that it was in; at the beginning, if it was in none.
+    fn came_rad(&self) -> f64 {
+        let inside = self.steps.iter().rposition(|step| step.in_junction);
+        let before =
+            inside.and_then(|inside| self.steps[..inside].iter().rev().find(|step| !step.in_junction));
+        before.unwrap_or(&self.steps[0]).place.pose.heading_rad
+    }
+
     /// Whether it has stood for the last seconds.
     fn has_stood(&self) -> bool {
         let last = self.steps.len().saturating_sub(STOOD_STEPS);
@@ -309,18 +318,18 @@ impl Way {
         moves && self.steps.iter().any(|step| is_beside(step) && is_slow(step))
     }
 
-    /// Whether it was on the other side of the road beside, or just behind, a slower vehicle that goes the same way. `others`: where they were at each
-    /// step.
-    fn passes(&self, others: &[Vec<Place>]) -> bool {
+    /// Whether it was on the other side of the road beside or behind a slower vehicle that drives the same way. `others`: where they
+    /// were at each step.
+    fn overtakes_on_other_side(&self, others: &[Vec<Place>]) -> bool {
         self.steps.iter().zip(others).filter(|(step, _)| step.is_against).any(|(step, others)| {
             let own = step.place;
             others.iter().any(|other| {
                 let there = own.pose.to_local(other.pose.position);
-                let closing_mps = own.speed_mps() - own.pose.forward().dot(&other.velocity_mps);
-                let is_ahead = there.x < PASSES_M + LATE_S * closing_mps;
-                let is_beside = there.x > -PASSES_M && is_ahead && there.y.abs() < ALONGSIDE_M;
                 let turned_rad = wrap_angle(other.pose.heading_rad - own.pose.heading_rad).abs();
-                is_beside && turned_rad < ALIKE_RAD && closing_mps > 0.0
+                (-PASSED_M..BEHIND_M).contains(&there.x)
+                    && there.y.abs() < LANE_M
+                    && turned_rad < ALIKE_RAD
+                    && (PARKING_MPS..own.speed_mps()).contains(&other.speed_mps())
             })
         })
     }
@@ -372,20 +381,23 @@ pub(super) struct Before {
 impl Before {
     /// The first type that fits.
     pub fn kind(&self) -> PreCrash {
-        // Who runs into one ahead in its own lane does not do so because of a light or a sign.
-        let is_rear_end = self.is_lengthwise && self.apart_rad() < ALIKE_RAD;
-        match () {
-            () if self.is_wreck => return PreCrash::Wreck,
-            () if self.has_failed => return PreCrash::VehicleFailure,
-            () => {}
+        if self.is_wreck {
+            return PreCrash::Wreck;
+        }
+        if self.has_failed {
+            return PreCrash::VehicleFailure;
         }
         if let Some(kind) = self.loses_control() {
             return kind;
         }
-        match () {
-            () if self.ran_red && !is_rear_end => return PreCrash::RunningRedLight,
-            () if self.ran_stop && !is_rear_end => return PreCrash::RunningStopSign,
-            () => {}
+        // Who runs into one ahead that came the same way does not do so because of a light or a sign.
+        if !self.is_rear_end() {
+            if self.ran_red {
+                return PreCrash::RunningRedLight;
+            }
+            if self.ran_stop {
+                return PreCrash::RunningStopSign;
+            }
         }
         let backs = || (self.ego.backs() || self.other.backs()).then_some(PreCrash::Backing);
         let first = self.leaves_road().or_else(|| self.by_body()).or_else(backs).or_else(|| self.evades());
@@ -422,7 +434,7 @@ impl Before {
             (true, true) if turns_left => PreCrash::LeftTurnAcrossPathSignalized,
             (true, false) if turns_left => PreCrash::LeftTurnAcrossPath,
             // One that comes over without meaning to change lanes drifts.
-            (true, _) if ego.is_some() || self.other.means_to() || self.passes() => {
+            (true, _) if ego.is_some() || self.other.means_to() || self.overtakes_on_other_side() => {
                 PreCrash::ManoeuvreOppositeDirection
             }
             (true, _) => PreCrash::NoManoeuvreOppositeDirection,
@@ -431,6 +443,12 @@ impl Before {
             (false, false) => PreCrash::StraightCrossingPaths,
             (false, true) => PreCrash::Other,
         }
+    }
+
+    /// Whether one runs into the rear of the other, and both came the same way.
+    fn is_rear_end(&self) -> bool {
+        let came_apart_rad = wrap_angle(self.other.came_rad() - self.ego.came_rad()).abs();
+        self.is_lengthwise && self.apart_rad().max(came_apart_rad) < ALIKE_RAD
     }
 
     /// How far apart the two head. Before a junction each looks where it comes from; along a bend those who are apart look elsewhere
@@ -471,8 +489,8 @@ impl Before {
     }
 
     /// Whether one of them overtakes on the other's side of the road.
-    fn passes(&self) -> bool {
-        [&self.ego, &self.other].iter().any(|way| way.passes(&self.third))
+    fn overtakes_on_other_side(&self) -> bool {
+        [&self.ego, &self.other].iter().any(|way| way.overtakes_on_other_side(&self.third))
     }
 
     fn evades(&self) -> Option<PreCrash> {
@@ -500,6 +518,10 @@ impl Before {
         let is_ahead = ego_from.to_local(other_from.position).x > 0.0;
         let (lead, follower) = if is_ahead { (&self.other, &self.ego) } else { (&self.ego, &self.other) };
         let came_over = self.came_over();
+        let now_rad = wrap_angle(self.other.to().pose.heading_rad - self.ego.to().pose.heading_rad).abs();
+        if turns && now_rad > TURN_RAD {
+            return PreCrash::TurningSameDirection;
+        }
         if self.is_lengthwise && follower.changes_lanes() {
             return PreCrash::FollowingVehicleManoeuvre;
         }
@@ -639,6 +661,45 @@ mod tests {
     }
 
     #[test]
+    fn a_rear_end_after_a_red_light_is_one_if_both_came_the_same_way() {
+        let ahead = Before {
+            ran_red: true,
+            ran_stop: true,
+            ..before([at(40.0, 0.0, 0.0, 0.0), at(54.0, 0.0, 0.0, 0.0)])
+        };
+        assert_eq!(ahead.kind(), PreCrash::LeadStopped);
+        // The other came from the side and turned into the ego vehicle's way.
+        let mut turned = ahead.clone();
+        turned.other.steps[0].place = at(40.0, -20.0, 90.0, 6.0);
+        assert_eq!(turned.kind(), PreCrash::RunningRedLight);
+        assert_eq!(Before { ran_red: false, ..turned.clone() }.kind(), PreCrash::RunningStopSign);
+        // The same before the looks, as far as its way into the junction is seen.
+        let inside = Step { in_junction: true, ..turned.other.steps[0] };
+        turned.other.steps.insert(1, inside);
+        turned.ego.steps.insert(1, turned.ego.steps[0]);
+        turned.third.push(Vec::new());
+        assert_eq!(turned.kind(), PreCrash::RunningRedLight);
+        assert_eq!(Before { is_lengthwise: false, ..ahead }.kind(), PreCrash::RunningRedLight);
+    }
+
+    #[test]
+    fn who_overtakes_on_the_other_side_makes_a_manoeuvre() {
+        let of = |is_against: bool, other: Option<Place>| {
+            let mut oncoming = before([at(100.0, 0.0, 180.0, 8.0), at(54.0, 0.0, 180.0, 8.0)]);
+            oncoming.ego.steps.iter_mut().for_each(|step| step.is_against = is_against);
+            oncoming.third[1].extend(other);
+            oncoming.kind().number()
+        };
+        let at_end = |ahead_m: f64, speed_mps: f64| Some(at(50.0 + ahead_m, -3.5, 0.0, speed_mps));
+        assert_eq!(of(true, at_end(25.0, 6.0)), Some(20));
+        assert_eq!(of(true, at_end(-8.0, 6.0)), Some(20));
+        assert_eq!(of(false, at_end(25.0, 6.0)), Some(21), "in its own lane");
+        for other in [None, at_end(25.0, 0.0), at_end(25.0, 12.0), at_end(35.0, 6.0)] {
+            assert_eq!(of(true, other), Some(21), "{other:?}");
+        }
+    }
+
+    #[test]
     fn people_cyclists_animals_and_things_have_types_of_their_own() {
         let walker = Before {
             body: Body::Pedestrian,
@@ -686,6 +747,10 @@ mod tests {
         assert_eq!(changed.kind().number(), Some(6));
         assert_eq!(along(Step { place: at(20.0, -3.0, 180.0, -5.0), ..beside }).kind().number(), Some(8));
 
+        // One that moves slowly beside the lanes, without having stood in sight, comes from there, too.
+        let mut rolls = before([at(45.0, -3.0, 0.0, 1.5), at(54.0, 0.0, 0.0, 4.0)]);
+        rolls.other.steps[0].off_road_m = 0.8;
+        assert_eq!(rolls.kind(), PreCrash::Parking);
         let backs = before([at(60.0, 0.0, 0.0, -2.0), at(54.0, 0.0, 0.0, -2.0)]);
         assert_eq!(backs.kind(), PreCrash::Backing);
         let mut parks = before([at(45.0, -3.0, 0.0, 0.0), at(54.0, 0.0, 10.0, 4.0)]);

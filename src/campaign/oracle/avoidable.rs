@@ -4,7 +4,8 @@
 //! vehicle that had to give way could still stop, if that is earlier, but no further than 8 s. All other road users then move as
 //! recorded until the recorded contact, and after it as they themselves decide. The ego vehicle, the same car on the same
 //! road, is driven by each reference driver in turn, at most as fast as a careful driver would have been there (`lawful`). A
-//! driver watches for 2 s before it takes over, and knows from the first which lane changes of the route are begun or over.
+//! driver watches for 2 s before it takes over, and knows from the first which lane changes of the route are begun or over, and
+//! whom the ego vehicle has seen at a crosswalk.
 //!
 //! 1. The careful drivers drive from the takeover.
 //! 2. If none of them avoids the collision, and the ego vehicle slowed down to walking pace since, they drive from its slowest
@@ -42,7 +43,7 @@ use avastra_drivers::{Ads, Evasion};
 use avastra_lang::model::vocabulary::Priority;
 use avastra_lang::model::{Avoidability, EGO_ACCELERATION_MPS2_MAX};
 use avastra_world::sim::{
-    Contact, Control, DT_S, EgoMotion, FRAME_TICKS, Sensed, VehicleParameters, World, pedals_for,
+    Contact, Control, DT_S, EgoMotion, FRAME_TICKS, VehicleParameters, World, pedals_for,
 };
 
 use super::hazard::{Onset, last_chance, onset, waiting_line_m};
@@ -197,8 +198,12 @@ pub fn judge_one(recording: &[World], contact: &Contact, met: OrientedBox) -> Ju
     let from = onset.first.min(last_chance(recording, contact, met).unwrap_or(last)).max(earliest);
     let mut case = Case::new(recording, from, contact);
     // The letter keeps the recorded path and speed, whoever had to give way.
-    let to_the_letter =
-        Case { from: onset.conflict.max(earliest), speed_mps_max: f64::INFINITY, looks_anew: false, ..case };
+    let to_the_letter = Case {
+        from: onset.conflict.max(earliest),
+        speed_mps_max: f64::INFINITY,
+        looks_anew: false,
+        ..case.clone()
+    };
     let mut careful = case.avoided_by(&CAREFUL);
     if careful.is_empty()
         && let Some(slowest) = crept_from(recording, from)
@@ -248,6 +253,19 @@ fn shoved(recording: &[World], met: OrientedBox) -> Option<usize> {
     None
 }
 
+/// The people at crosswalks who were in sight in these worlds.
+fn minded(worlds: &[World]) -> Minded {
+    let mut minded = Minded::default();
+    if let Some(first) = worlds.first().filter(|world| !world.scene().route.crosswalks_m.is_empty()) {
+        let mut sensed = first.sensed();
+        for world in worlds.iter().rev().step_by(FRAME_TICKS as usize) {
+            world.sense(&mut sensed);
+            minded.notice(world, &sensed);
+        }
+    }
+    minded
+}
+
 fn names<'a>(drivers: impl Iterator<Item = &'a str>) -> Vec<String> {
     drivers.map(str::to_owned).collect()
 }
@@ -259,7 +277,7 @@ fn reference(name: &str, world: &World) -> Box<dyn Ads> {
 }
 
 /// A collision that is to be driven again.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Case<'a> {
     recording: &'a [World],
     /// Index of the takeover.
@@ -273,6 +291,10 @@ struct Case<'a> {
     waits_at_m: Option<f64>,
     /// Whether the drivers keep to the way that the ego vehicle took: it was run into from behind.
     keeps_way: bool,
+    /// The people at crosswalks whom the ego vehicle has seen before the takeover.
+    minded: Minded,
+    /// Those of them for whom it should have slowed down by then: seen for as long as a driver watches.
+    minded_before: Minded,
 }
 
 impl<'a> Case<'a> {
@@ -294,6 +316,8 @@ impl<'a> Case<'a> {
             speed_mps_max,
             waits_at_m: line_m.filter(is_before),
             keeps_way,
+            minded: minded(&recording[..=from]),
+            minded_before: minded(&recording[..from.saturating_sub(ticks(WATCH_S))]),
         }
     }
 
@@ -356,8 +380,10 @@ impl<'a> Case<'a> {
         let mut world = recording[0].clone();
         let mut sensed = world.sensed();
         let mut held = RecordedThenBraking::new(recording);
+        let mut minded = self.minded.clone();
         for recorded in &recording[1..] {
             world.sense(&mut sensed);
+            minded.notice(&world, &sensed);
             driver.drive(&sensed);
             let grip_mps2 = world.conditions().friction * GRAVITY_MPS2;
             let motion = held.step(recorded.ego(), driver.braking_mps2().min(grip_mps2));
@@ -365,7 +391,7 @@ impl<'a> Case<'a> {
                 return false;
             }
         }
-        self.is_clear_after(&mut world, driver, self.minded(), &mut |_| true)
+        self.is_clear_after(&mut world, driver, minded, &mut |_| true)
     }
 
     /// The first manoeuvre that avoids the collision on the road, in words.
@@ -373,7 +399,7 @@ impl<'a> Case<'a> {
         let start = &self.recording[self.from];
         let mut manoeuvres = Evasion::all(start.scene());
         let starts_on_road = is_on_road(start);
-        let free = Case { speed_mps_max: f64::INFINITY, keeps_way: false, ..*self };
+        let free = Case { speed_mps_max: f64::INFINITY, keeps_way: false, ..self.clone() };
         let found = manoeuvres.find(|manoeuvre| {
             let mut driver = manoeuvre.clone();
             free.drive(&mut driver, &mut |world| !starts_on_road || is_on_road(world))
@@ -384,15 +410,16 @@ impl<'a> Case<'a> {
     /// Drives from the takeover on; `false` if there is a collision, or a world is not `allowed`.
     fn drive(&self, driver: &mut dyn Ads, allowed: &mut dyn FnMut(&World) -> bool) -> bool {
         let start = &self.recording[self.from];
-        let mut minded = self.minded();
-        let mut world = start.with_ego_at_most(lawful_mps(start, &minded));
+        let mut minded = self.minded.clone();
+        let mut world = start.with_ego_at_most(lawful_mps(start, &self.minded_before));
         let mut sensed = world.sensed();
         if self.looks_anew {
             driver.take_over(&sensed);
         }
         for recorded in &self.recording[self.from + 1..] {
             world.sense(&mut sensed);
-            let control = self.slowed(driver.drive(&sensed), &world, &mut minded, &sensed);
+            minded.notice(&world, &sensed);
+            let control = self.slowed(driver.drive(&sensed), &world, &minded);
             if self.is_hit(world.tick_recorded(&control, recorded)) || !self.is_fine(&world, allowed) {
                 return false;
             }
@@ -411,7 +438,8 @@ impl<'a> Case<'a> {
         let mut sensed = world.sensed();
         for _ in 0..ticks(AFTER_S) {
             world.sense(&mut sensed);
-            let control = self.slowed(driver.drive(&sensed), world, &mut minded, &sensed);
+            minded.notice(world, &sensed);
+            let control = self.slowed(driver.drive(&sensed), world, &minded);
             if self.is_hit(world.tick(&control)) || !self.is_fine(world, allowed) {
                 return false;
             }
@@ -419,27 +447,10 @@ impl<'a> Case<'a> {
         true
     }
 
-    /// The people at crosswalks whom a driver has seen before the takeover.
-    fn minded(&self) -> Minded {
-        let mut minded = Minded::default();
-        let before = &self.recording[..=self.from];
-        if !before[0].scene().route.crosswalks_m.is_empty() {
-            let mut sensed = before[0].sensed();
-            for world in before.iter().rev().step_by(FRAME_TICKS as usize) {
-                world.sense(&mut sensed);
-                minded.notice(world, &sensed);
-            }
-        }
-        minded
-    }
-
     /// A command with which the ego vehicle goes no faster than a careful driver does here.
-    fn slowed(&self, control: Control, world: &World, minded: &mut Minded, sensed: &Sensed) -> Control {
-        if world.ticks().is_multiple_of(FRAME_TICKS) {
-            minded.notice(world, sensed);
-        }
+    fn slowed(&self, control: Control, world: &World, minded: &Minded) -> Control {
         let front_m = VehicleParameters::MKZ.front_m(world.ego_station_m());
-        // One that has come to stand a little beyond its line waits there.
+        // One that stops a little too late waits there.
         let waits = self.waits_at_m.filter(|line_m| *line_m + LINE_GAP_M > front_m);
         let waits_mps = waits.map_or(f64::INFINITY, |line_m| {
             stops_within_mps(line_m - front_m - LINE_GAP_M, 0.0, COMFORTABLE_MPS2)
@@ -597,9 +608,11 @@ mod tests {
                 speed_mps_max,
                 waits_at_m: line.map(|ahead_m| front_m + ahead_m),
                 keeps_way: false,
+                minded: Minded::default(),
+                minded_before: Minded::default(),
             };
             let control = Control { throttle_pct: 80.0, brake_pct: 0.0, steer_rad: 0.1 };
-            case.slowed(control, &world, &mut Minded::default(), &world.sensed())
+            case.slowed(control, &world, &Minded::default())
         };
         let free = held(None, f64::INFINITY);
         for tenth in 0..800 {
@@ -633,11 +646,12 @@ mod tests {
                 speed_mps_max: 5.0,
                 waits_at_m: None,
                 keeps_way: false,
+                minded: Minded::default(),
+                minded_before: Minded::default(),
             },
             Control { throttle_pct: 0.0, brake_pct: 90.0, steer_rad: 0.0 },
             &world,
-            &mut Minded::default(),
-            &world.sensed(),
+            &Minded::default(),
         );
         assert_eq!(brakes.brake_pct, 90.0);
     }

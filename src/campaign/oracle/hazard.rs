@@ -103,6 +103,7 @@ pub fn waiting_line_m(world: &World, contact: &Contact) -> Option<f64> {
             | Rule::FirstToStop
             | Rule::Sign
             | Rule::Turning
+            | Rule::TurningOff
             | Rule::FromTheRight
             | Rule::SameSide
     );

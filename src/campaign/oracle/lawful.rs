@@ -4,6 +4,7 @@
 //! A driver that was faster is judged as accident analysts do: from the same place, at the speed that was allowed there
 //! ("avoidable at the permitted speed").
 
+use avastra_base::geometry::Projection;
 use avastra_base::kinematics::{
     CAREFUL_BRAKING_MPS2, CAREFUL_DELAY_S, CAREFUL_JERK_MPS3, GRAVITY_MPS2, SPEEDING_MPS, STANDING_MPS,
 };
@@ -11,11 +12,10 @@ use avastra_drivers::in_sight;
 use avastra_lang::model::vocabulary::Body;
 use avastra_world::sim::{Obstacle, Sensed, SignalColour, VehicleParameters, World};
 
-/// A person no farther from a crosswalk waits to cross on it, m, and one that is farther beside the ego vehicle's strip and walks away
-/// has crossed. Ours.
+/// A person no farther from a crosswalk waits to cross on it, m. Ours.
 const WAITS_M: f64 = 1.5;
-/// Somebody at a crosswalk is looked for along so much of the route, m.
-const APPROACH_M: f64 = 80.0;
+/// One that walks away from the ego vehicle's route, so far beside a vehicle in the middle of it, has crossed, m. Ours.
+const CROSSED_M: f64 = 1.5;
 /// Braking of a comfortable stop, before a crosswalk at which a person waits or before a line, m/s². Ours.
 pub const COMFORTABLE_MPS2: f64 = 3.0;
 /// From the moment when something comes into sight until full braking, s: perception, reaction, and half of the time in which braking
@@ -32,23 +32,23 @@ pub struct Minded {
 }
 
 impl Minded {
-    /// Notes who is in sight and waits at the next crosswalk.
+    /// Notes who is in sight at the next crosswalk, and has not crossed.
     pub fn notice(&mut self, world: &World, sensed: &Sensed) {
         if world.scene().route.crosswalks_m.is_empty() {
             return;
         }
         for object in sensed.objects.iter().filter(|object| object.body == Body::Pedestrian) {
             let is_new = !self.seen.contains(&object.id) && in_sight(object, &sensed.conditions);
-            if is_new && world.obstacle(object.id).is_some_and(|found| waits_at_crosswalk(world, found)) {
+            if is_new && world.obstacle(object.id).is_some_and(|found| crosses(world, found)) {
                 self.seen.push(object.id);
             }
         }
     }
 
-    /// Whether one of them is still at the next crosswalk, and has not crossed before the ego vehicle.
+    /// Whether one of them is still at the next crosswalk, and has not crossed.
     fn holds(&self, world: &World) -> bool {
         let mut people = self.seen.iter().filter_map(|id| world.obstacle(*id));
-        people.any(|person| is_at_crosswalk(world, person) && !has_crossed(world, person))
+        people.any(|person| crosses(world, person))
     }
 }
 
@@ -83,29 +83,27 @@ fn crosswalk_mps(world: &World, minded: &Minded) -> f64 {
 
 /// Whether a pedestrian stands on the next crosswalk of the route, or within [`WAITS_M`] of it.
 pub fn waits_at_crosswalk(world: &World, obstacle: &Obstacle) -> bool {
-    obstacle.body == Body::Pedestrian
-        && obstacle.velocity_mps.norm() < STANDING_MPS
-        && is_at_crosswalk(world, obstacle)
+    obstacle.velocity_mps.norm() < STANDING_MPS && at_crosswalk(world, obstacle).is_some()
 }
 
-/// Whether somebody is on the next crosswalk of the route, or within [`WAITS_M`] of it.
-fn is_at_crosswalk(world: &World, obstacle: &Obstacle) -> bool {
-    let Some((begin_m, end_m)) = next_crosswalk(world) else { return false };
+/// Whether a pedestrian is at the next crosswalk, and does not walk away from the route beyond it.
+fn crosses(world: &World, obstacle: &Obstacle) -> bool {
+    at_crosswalk(world, obstacle).is_some_and(|place| {
+        let left_mps = world.scene().route.path.pose_at(place.station_m).left().dot(&obstacle.velocity_mps);
+        let beside_m = place.offset_m.abs() - world.ego_outline().half_width_m;
+        beside_m < CROSSED_M || place.offset_m * left_mps <= 0.0
+    })
+}
+
+/// Where a pedestrian is along the route, if it is on the next crosswalk or within [`WAITS_M`] of it.
+fn at_crosswalk(world: &World, obstacle: &Obstacle) -> Option<Projection> {
+    let (begin_m, end_m) = next_crosswalk(world)?;
     let position = obstacle.outline.pose.position;
-    world.scene().crosswalk_gap_m(position) <= WAITS_M && {
-        let station_m = world.scene().route.path.project_near(position, begin_m, 20.0).station_m;
-        (begin_m - WAITS_M..end_m + WAITS_M).contains(&station_m)
+    if obstacle.body != Body::Pedestrian || world.scene().crosswalk_gap_m(position) > WAITS_M {
+        return None;
     }
-}
-
-/// Whether somebody walks away from the strip that the ego vehicle drives on.
-fn has_crossed(world: &World, obstacle: &Obstacle) -> bool {
-    let path = &world.scene().route.path;
-    let position = obstacle.outline.pose.position;
-    let found = path.project_near(position, world.ego_station_m(), APPROACH_M);
-    let left_mps = path.pose_at(found.station_m).left().dot(&obstacle.velocity_mps);
-    let beside_m = found.offset_m.abs() - world.ego_outline().half_width_m;
-    beside_m > WAITS_M && found.offset_m * left_mps > 0.0
+    let place = world.scene().route.path.project_near(position, begin_m, 20.0);
+    (begin_m - WAITS_M..end_m + WAITS_M).contains(&place.station_m).then_some(place)
 }
 
 /// The next crosswalk before the front, unless a light there is green for the ego vehicle.

@@ -35,11 +35,19 @@ pub enum Ending {
     Hit,
     /// Without a contact, but other road users crashed into each other: it was not the test that was meant.
     OthersCrashed,
+    /// The driving system failed before anything else came of it: its process died, say.
+    Failed,
 }
 
 impl Ending {
-    pub const ALL: [Ending; 5] =
-        [Ending::Avoided, Ending::Near, Ending::Mitigated, Ending::Hit, Ending::OthersCrashed];
+    pub const ALL: [Ending; 6] = [
+        Ending::Avoided,
+        Ending::Near,
+        Ending::Mitigated,
+        Ending::Hit,
+        Ending::OthersCrashed,
+        Ending::Failed,
+    ];
 
     pub fn in_words(self) -> &'static str {
         match self {
@@ -48,6 +56,7 @@ impl Ending {
             Ending::Mitigated => "mitigated",
             Ending::Hit => "hit",
             Ending::OthersCrashed => "others crashed",
+            Ending::Failed => "driving system failed",
         }
     }
 }
@@ -87,9 +96,10 @@ impl ProtocolTest {
         Some((self.before_mps? - self.impact_mps?).max(0.0))
     }
 
-    /// Whether a protocol calls it failed: a contact, or a requirement that was breached.
+    /// Whether a protocol calls it failed: a contact, a requirement that was breached, or a driving system that gave up.
     pub fn is_failed(&self) -> bool {
-        self.ending.is_some() && (self.impact_mps.is_some() || !self.breached.is_empty())
+        let is_hit = self.impact_mps.is_some() || !self.breached.is_empty();
+        self.ending.is_some_and(|ending| is_hit || ending == Ending::Failed)
     }
 
     /// The action with its values, without the road: `begin(speed: 30)`.
@@ -143,8 +153,11 @@ impl Database {
         let episodes = "SELECT episode, road, pet_s FROM episode ORDER BY episode";
         let episodes: Vec<(i64, String, Option<f64>)> =
             query_all(read, episodes, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+        let failures: Vec<i64> =
+            query_all(read, "SELECT episode FROM failure ORDER BY episode", |row| row.get(0))?;
         let mut tests = Vec::new();
         for (episode, road, pet_s) in episodes {
+            let has_failed = failures.binary_search(&episode).is_ok();
             let steps = of_episode(&steps, episode, |step| step.episode);
             let contacts = of_episode(&contacts, episode, |contact| contact.episode);
             let breaches = of_episode(&breaches, episode, |breach| breach.0);
@@ -172,6 +185,7 @@ impl Database {
                     (test.action, test.values) = (Some(name), values);
                 }
                 test.refused = refused;
+                test.ending = has_failed.then_some(Ending::Failed);
                 tests.push(test);
             }
             for (nth, at) in begun.iter().enumerate() {
@@ -179,7 +193,11 @@ impl Database {
                 let until = begun.get(nth + 1).copied().unwrap_or(steps.len());
                 // The encroachment is the episode's: it belongs to its only action, if there is one.
                 let pet_s = pet_s.filter(|_| begun.len() == 1);
-                tests.push(ProtocolTest::of(&road, &steps[*at..until], contacts, breaches, pet_s));
+                let mut test = ProtocolTest::of(&road, &steps[*at..until], contacts, breaches, pet_s);
+                if has_failed && until == steps.len() && test.impact_mps.is_none() {
+                    test.ending = Some(Ending::Failed);
+                }
+                tests.push(test);
             }
         }
         Ok(tests)

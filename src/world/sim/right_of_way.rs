@@ -9,8 +9,9 @@
 //! | lanes of a junction | a red light or a late yellow one, a stop sign passed without standing | signs 23, 10 |
 //! | lanes of a junction | signs, then turning left before oncoming traffic, then the right | 18, 16 |
 //! | elsewhere | a vehicle that backs up, turns round, or comes from beside the road gives way | 14, 18 |
-//! | beside each other into a junction | a vehicle that turns off lets pass who goes straight on beside it | 16 |
 //! | elsewhere | a vehicle that leaves its lane gives way to one that keeps its own | 14, 11 |
+//! | side by side into a junction | a vehicle that turns off gives way to one that goes straight on beside it | 16 |
+//! | side by side into a junction | a vehicle does not overtake another where that turns across the road | 11 |
 //! | one lane | a vehicle behind another keeps its distance | 13.5 |
 //!
 //! What a vehicle does decides, and not the word that told it so: a lane change, an offset, and a trajectory that lead
@@ -36,7 +37,7 @@
 //! pedestrian may not step onto the road without regard to distance and speed of what comes (20.6), and a
 //! driver must not endanger pedestrians and be able to stop for what can be foreseen (21.1, 13.1). So the ego
 //! vehicle has priority only over one that steps onto the carriageway too late for its brakes, and otherwise
-//! neither has. It loses that priority once it sees the pedestrian and could still stop, and it
+//! neither has. One that stays beside a road which the ego vehicle leaves has priority. It loses that priority once it sees the pedestrian and could still stop, and it
 //! has none at walking pace, from which a driver can stop for any pedestrian.
 //!
 //! If two vehicles come towards each other outside junctions, the one beyond the middle of the road has to give way
@@ -66,7 +67,7 @@ mod side;
 mod turning;
 
 use crossing::{Crossing, Vehicle, cuts_across};
-use on_foot::{Strip, ego_leaves_road_to, on_foot};
+use on_foot::{Strip, on_foot, whatever_the_room};
 use side::{Side, beyond_middle};
 
 pub(super) use on_foot::light_before;
@@ -164,6 +165,16 @@ impl Meeting {
     /// Whether the first of the two left the other room, and may clear the junction.
     fn is_clearing(&self) -> bool {
         self.ruling.rule == Rule::Clearing
+    }
+
+    /// Whether what was found in a lane holds no longer.
+    fn is_over(&self, side: &Side) -> bool {
+        match self.ruling.rule {
+            Rule::Clearing => side.backs(self.ruling.mover),
+            // Of one that turns across another's way; they do not follow each other.
+            Rule::Overtaking => false,
+            _ => side.is_gentle(),
+        }
     }
 }
 
@@ -345,9 +356,7 @@ impl Rights {
         let Some(side) = side.filter(|_| shares) else { return };
         match &mut self.meeting {
             // There was time to brake gently since: from now on it is one vehicle behind another.
-            Some(meeting) if meeting.place == Place::Lane && !meeting.is_clearing() && side.is_gentle() => {
-                self.meeting = None;
-            }
+            Some(meeting) if meeting.place == Place::Lane && meeting.is_over(&side) => self.meeting = None,
             Some(meeting) if meeting.place == Place::Lane => meeting.tick = around.tick,
             Some(_) | None if began => {
                 let ruling = side.at_coming(|| beyond_middle(this, around, None), around.time_s());
@@ -378,11 +387,13 @@ impl Rights {
             && (strip.aside_m < if walks { BESIDE_M } else { 0.0 } || walks && is_on_road());
         if shares {
             let known = self.meeting.filter(|_| self.shares == Some(true)).map(|meeting| meeting.ruling);
-            let ruling = match known {
-                // It was beside the road, and the ego vehicle comes there.
-                Some(known) if known.rule != Rule::LeavingLane && ego_leaves_road_to(this, around) => {
-                    on_foot(this, &strip, around)
-                }
+            // Who comes onto a crosswalk, or stays beside the road that the ego vehicle leaves, and no longer does.
+            let now = whatever_the_room(this, &strip, around);
+            let is_other = |known: &Ruling| match now {
+                Some(rule) => known.rule != rule,
+                None => known.rule == Rule::LeavingLane,
+            };
+            let ruling = match known.filter(|known| !is_other(known)) {
                 // The pedestrian came too late, but now the ego vehicle sees it and can stop, so it is no surprise any more.
                 Some(known) if known.priority == Priority::Ego && in_sight && strip.leaves_room(around) => {
                     Ruling { priority: Priority::None, rule: Rule::OnFoot, ..known }

@@ -4,10 +4,12 @@ import { el } from "./dom.js";
 import { figure, plural } from "./words.js";
 
 /** How an action ends, in the order in which the counts come. */
-const HEAT_ENDINGS = ["avoided", "near miss", "mitigated", "hit", "others crashed"];
-const HEAT_SIGNS = ["●", "◔", "◑", "○", "⊘"];
+const HEAT_ENDINGS = ["avoided", "near miss", "mitigated", "hit", "others crashed", "driving system failed"];
+const HEAT_SIGNS = ["●", "◔", "◑", "○", "⊘", "✖"];
 /** A test whose road users crashed into each other shows nothing of the ego vehicle. */
 const HEAT_OTHERS = 4;
+/** No test at all: the driving system failed. */
+const HEAT_FAILED = 5;
 
 /** A section with a map for each pair of parameters; nothing without one. */
 export function heat(overview) {
@@ -57,7 +59,8 @@ function heatCell(tally) {
   const all = endings.reduce((sum, count) => sum + count, 0);
   const judged = endings.slice(0, HEAT_OTHERS).findLastIndex((count) => count > 0);
   // A breach without a contact is no clean drive.
-  const worst = breached > 0 ? Math.max(judged, 2) : judged >= 0 ? judged : HEAT_OTHERS;
+  const failed = endings[HEAT_FAILED] > 0;
+  const worst = failed ? HEAT_FAILED : breached > 0 ? Math.max(judged, 2) : judged >= 0 ? judged : HEAT_OTHERS;
   const told = HEAT_ENDINGS.map((ending, at) => endings[at] > 0 && `${endings[at]} ${ending}`).filter(Boolean);
   // An ego vehicle that stands is still hit at the speed of the other.
   const [both, ego, lost] = [relative, impact, reduction].map((mps) => figure(mps === null ? null : mps * 3.6, "", 0));

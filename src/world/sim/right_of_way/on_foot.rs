@@ -16,6 +16,9 @@ const KERB_M: f64 = 1.0;
 /// A light this far before a crosswalk holds for it, m. Ours.
 const LIGHT_M: f64 = 12.0;
 
+/// A body that moves faster across the road steps onto it, m/s. Ours.
+const STEPS_MPS: f64 = 0.5;
+
 /// Where a pedestrian is, seen along the ego vehicle's route.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Strip {
@@ -30,7 +33,8 @@ impl Strip {
     pub fn of(this: &Obstacle, around: &Around) -> Strip {
         let route = &around.scene.route;
         let position = this.outline.pose.position;
-        let found = route.path.project_near(position, around.ego_station_m, APPROACH_M);
+        // Along a turn the way to it is longer than the distance.
+        let found = route.path.project_near(position, around.ego_station_m, 2.0 * APPROACH_M);
         let ego = route.path.project_near(around.ego_outline.pose.position, around.ego_station_m, 10.0);
         let half_m = this.outline.half_length_m;
         Strip {
@@ -49,30 +53,39 @@ impl Strip {
 /// Who has priority, the ego vehicle or a pedestrian, an animal or a thing that comes onto the carriageway or into its way
 /// now.
 pub(super) fn on_foot(this: &Obstacle, strip: &Strip, around: &Around) -> Ruling {
-    let route = &around.scene.route;
-    let ruling = |priority, rule| Ruling { priority, rule, mover: Mover::Other, time_s: around.time_s() };
-    let mut crosswalks = route.crosswalks_m.iter().filter(|_| this.body != Body::Object);
-    let at = |(from_m, to_m): &&(f64, f64)| (from_m - KERB_M..to_m + KERB_M).contains(&strip.station_m);
-    if let Some((from_m, _)) = crosswalks.find(at)
-        && light_before(*from_m, around) != Some(SignalColour::Green)
-    {
-        return ruling(Priority::Other, Rule::Crosswalk);
-    }
-    if ego_leaves_road_to(this, around) {
-        return Ruling { mover: Mover::Ego, ..ruling(Priority::Other, Rule::LeavingLane) };
-    }
-    match strip.leaves_room(around) {
-        true => ruling(Priority::None, Rule::OnFoot),
-        false => ruling(Priority::Ego, Rule::SteppingOut),
+    let ruling = |priority, rule, mover| Ruling { priority, rule, mover, time_s: around.time_s() };
+    match whatever_the_room(this, strip, around) {
+        Some(Rule::LeavingLane) => ruling(Priority::Other, Rule::LeavingLane, Mover::Ego),
+        Some(rule) => ruling(Priority::Other, rule, Mover::Other),
+        None if strip.leaves_room(around) => ruling(Priority::None, Rule::OnFoot, Mover::Other),
+        None => ruling(Priority::Ego, Rule::SteppingOut, Mover::Other),
     }
 }
 
-/// Whether the ego vehicle has left the road with a corner, and a body is beside the road, too.
-pub(super) fn ego_leaves_road_to(this: &Obstacle, around: &Around) -> bool {
+/// The rule by which the ego vehicle gives way however late somebody came: to who is on a crosswalk, and to who stays beside the
+/// road that it leaves.
+pub(super) fn whatever_the_room(this: &Obstacle, strip: &Strip, around: &Around) -> Option<Rule> {
+    let mut crosswalks = around.scene.route.crosswalks_m.iter().filter(|_| this.body != Body::Object);
+    let at = |(from_m, to_m): &&(f64, f64)| (from_m - KERB_M..to_m + KERB_M).contains(&strip.station_m);
+    let is_free = |from_m: f64| light_before(from_m, around) == Some(SignalColour::Green);
+    if crosswalks.find(at).is_some_and(|(from_m, _)| !is_free(*from_m)) {
+        return Some(Rule::Crosswalk);
+    }
+    ego_leaves_road_to(this, strip, around).then_some(Rule::LeavingLane)
+}
+
+/// Whether the ego vehicle has left the road on the side of a body that stays beside it.
+fn ego_leaves_road_to(this: &Obstacle, strip: &Strip, around: &Around) -> bool {
     let map = &around.scene.map;
     let is_off = |at: Vec2, pose: &Pose, by_m: f64| map.nearest(at, pose.heading_rad, by_m).is_none();
     let (pose, ego) = (&this.outline.pose, around.ego_outline);
-    is_off(pose.position, pose, 0.0) && ego.corners().iter().any(|corner| is_off(*corner, &ego.pose, OVER_M))
+    let along = around.scene.route.path.pose_at(strip.station_m).forward();
+    if along.perp(&this.velocity_mps).abs() > STEPS_MPS || !is_off(pose.position, pose, 0.0) {
+        return false;
+    }
+    let side = ego.pose.to_local(pose.position).y.signum();
+    let is_there = |corner: &&Vec2| ego.pose.to_local(**corner).y * side > 0.0;
+    ego.corners().iter().filter(is_there).any(|corner| is_off(*corner, &ego.pose, OVER_M))
 }
 
 /// The colour of the light before a crosswalk of the route, which begins at a station; green if one of several is.

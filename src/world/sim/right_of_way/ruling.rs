@@ -16,6 +16,7 @@ pub enum Rule {
     FirstToStop,
     Sign,
     Turning,
+    TurningOff,
     FromTheRight,
     SameSide,
     Clearing,
@@ -41,6 +42,11 @@ impl Rule {
         self.row().0
     }
 
+    /// Whether it is about two that came to a junction side by side: at their coming, where one turns off.
+    pub(super) fn is_beside_into_junction(self) -> bool {
+        matches!(self, Rule::TurningOff | Rule::Overtaking)
+    }
+
     /// The rule in a word, and in a sentence with its article.
     fn row(self) -> (&'static str, &'static str) {
         match self {
@@ -62,6 +68,10 @@ impl Rule {
             Rule::Turning => {
                 ("turning", "a vehicle that turns across the road gives way to oncoming traffic (article 16)")
             }
+            Rule::TurningOff => (
+                "turning_off",
+                "a vehicle that turns off gives way to one that goes straight on beside it (article 16)",
+            ),
             Rule::FromTheRight => {
                 ("from_the_right", "the vehicle that comes from the right goes first (article 18)")
             }

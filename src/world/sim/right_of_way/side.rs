@@ -1,4 +1,4 @@
-//! Two vehicles beside or behind each other, outside junctions: which of them leaves its place.
+//! Two vehicles beside or behind each other: which of them leaves its place, or turns off across the other's.
 
 use avastra_base::geometry::{OrientedBox, Vec2, unit_vector};
 use avastra_base::kinematics::STANDING_MPS;
@@ -6,7 +6,7 @@ use avastra_lang::model::vocabulary::Priority;
 use avastra_road::RoadMap;
 
 use super::crossing::{Course, Vehicle};
-use super::turning::{Body, Pair, TURNS_RAD};
+use super::turning::{BEFORE_M, Moving, Pair, TURNS_RAD};
 use super::{ABRUPT_MPS2, Mover, Rule, Ruling, SIDEWAYS_MPS, allowed_mps, can_stop};
 use crate::sim::around::Around;
 use crate::sim::ego::VehicleParameters;
@@ -55,7 +55,7 @@ impl Side {
         let map = &around.scene.map;
         // The way of a vehicle that keeps to lanes; beside a trajectory, the lane that it is on or crosses.
         let (path, station_m) = match vehicle.way {
-            Course::Lanes(_) => vehicle.way.path()?,
+            Course::Lanes(driver) => (&driver.way.path, driver.station_m),
             Course::Path(..) | Course::Nowhere => {
                 let place = map.nearest(here, this.outline.pose.heading_rad, ASIDE_M)?;
                 (&map.lane(place.lane).centre, place.station_m)
@@ -85,17 +85,23 @@ impl Side {
             velocity_mps: around.ego_velocity_mps,
             towards_mps: ego_towards_mps,
             is_changing_lanes: false,
-        };
+            own: Own::of_ego(around),
+            by_nearest: false,
+        }
+        .rule(map);
         let other_does = Conduct {
             outline: &this.outline,
             forward: this.forward,
             velocity_mps: this.velocity_mps,
             towards_mps: other_towards_mps,
             is_changing_lanes: vehicle.is_changing_lanes,
-        };
+            own: Own::of_other(vehicle, map),
+            // Where the ego vehicle leaves its lane, that decides.
+            by_nearest: ego_does.is_none(),
+        }
+        .rule(map);
         let ego_mps = ego.forward.dot(&around.ego_velocity_mps);
-        let [ego_does, other_does] =
-            turns_off(vehicle, around).unwrap_or_else(|| [ego_does.rule(map), other_does.rule(map)]);
+        let [ego_does, other_does] = turns_off(vehicle, around).unwrap_or([ego_does, other_does]);
         Some(Side {
             aside_m: across_m.abs() - ego_width_m - other_width_m,
             apart_m,
@@ -127,6 +133,18 @@ impl Side {
             && can_stop((behind_mps - ahead_mps).max(0.0), room_m, ABRUPT_MPS2)
     }
 
+    /// Whether the vehicle behind stops before the one ahead if it brakes gently.
+    fn can_stop_before(&self) -> bool {
+        let behind_mps = if self.ego_is_ahead { self.other_mps } else { self.allowed_mps };
+        self.apart_m > 0.0 && can_stop(behind_mps.max(0.0), self.apart_m, ABRUPT_MPS2)
+    }
+
+    /// Whether the one of the two that has given way, and may clear the junction, backs up instead.
+    pub fn backs(&self, mover: Mover) -> bool {
+        let does = if mover == Mover::Ego { self.ego_does } else { self.other_does };
+        does == Some(Rule::Backing)
+    }
+
     /// Who comes into the lane of the other: the one that has to give way.
     fn comes(&self, time_s: f64) -> Option<Ruling> {
         let (priority, rule, mover) = match (self.ego_does, self.other_does) {
@@ -150,19 +168,20 @@ impl Side {
             Mover::Other => self.ego_is_ahead,
             Mover::Both => false,
         };
-        if self.along > 0.0 && self.apart_m > 0.0 && comes_behind {
-            return None;
-        }
-        match (self.is_gentle(), ruling.rule, ruling.mover) {
-            (false, ..) => Some(ruling),
+        let has_given_way = match ruling.mover {
+            Mover::Ego => Priority::Ego,
+            Mover::Other | Mover::Both => Priority::Other,
+        };
+        match ruling.rule {
+            // Whoever came first: one that turns and one that passes it do not drive on behind each other.
+            Rule::Overtaking => Some(ruling),
             // Who turns off before the other does not drive on ahead of it: it clears the junction.
-            (true, Rule::Turning, Mover::Ego) => {
-                Some(Ruling { priority: Priority::Ego, rule: Rule::Clearing, ..ruling })
+            Rule::TurningOff if self.can_stop_before() => {
+                Some(Ruling { priority: has_given_way, rule: Rule::Clearing, ..ruling })
             }
-            (true, Rule::Turning, _) => {
-                Some(Ruling { priority: Priority::Other, rule: Rule::Clearing, ..ruling })
-            }
-            (true, ..) => None,
+            Rule::TurningOff => Some(ruling),
+            _ if self.is_gentle() || (self.along > 0.0 && self.apart_m > 0.0 && comes_behind) => None,
+            _ => Some(ruling),
         }
     }
 
@@ -177,6 +196,10 @@ impl Side {
                 (None, None) => ruling(Priority::None, Rule::None, Mover::Both),
             };
             return Some(beyond_middle().unwrap_or_else(by_lane));
+        }
+        let turning = self.comes(time_s).filter(|ruling| ruling.rule.is_beside_into_junction());
+        if turning.is_some() {
+            return turning;
         }
         // The ends have met, and not the flanks.
         if self.along > 0.5 && self.apart_m >= self.aside_m {
@@ -201,22 +224,23 @@ impl Side {
     }
 }
 
-/// What each does, the ego vehicle and the other, if they are in a junction and one turns off across the other's way.
+/// What each does, the ego vehicle and the other, if the ego vehicle is at a junction and one turns off across the other's way.
 pub(super) fn turns_off(vehicle: &Vehicle, around: &Around) -> Option<[Option<Rule>; 2]> {
     let (route, map) = (&around.scene.route, &around.scene.map);
     let (car, station_m) = (VehicleParameters::MKZ, around.ego_station_m);
-    let inside = [car.front_m(station_m), station_m, car.rear_m(station_m)]
-        .map(|station_m| route.lane_at(station_m))
-        .into_iter()
-        .find(|part| map.lane(part.lane).junction.is_some())?;
+    let inside =
+        [car.front_m(station_m), station_m, car.rear_m(station_m), car.front_m(station_m) + BEFORE_M]
+            .map(|station_m| route.lane_at(station_m))
+            .into_iter()
+            .find(|part| map.lane(part.lane).junction.is_some())?;
     let way = vehicle.way.path()?;
     let [ego, other] =
         [(around.ego_outline, around.ego_velocity_mps), (&vehicle.this.outline, vehicle.this.velocity_mps)]
-            .map(|(outline, velocity_mps)| Body { position: outline.pose.position, velocity_mps });
-    Pair { map, route, inside, ego, other, way }.does()
+            .map(|(outline, velocity_mps)| Moving { pose: outline.pose, velocity_mps });
+    Pair { map, route, inside, ego, ego_station_m: station_m, other, way }.does()
 }
 
-/// What a vehicle does outside junctions.
+/// What a vehicle does.
 struct Conduct<'a> {
     outline: &'a OrientedBox,
     forward: Vec2,
@@ -225,6 +249,40 @@ struct Conduct<'a> {
     towards_mps: f64,
     /// Whether it drives a lane change, as far as that is known.
     is_changing_lanes: bool,
+    /// How it lies in the lane of its way, where lanes lie over each other; `None` if it keeps to none.
+    own: Option<Own>,
+    /// Whether the nearest lane counts in a junction for what keeps to none. Several may lie there.
+    by_nearest: bool,
+}
+
+/// How a vehicle lies in the lane of its way.
+struct Own {
+    /// Along the lane.
+    along: Vec2,
+    /// From the middle of the lane to that of the vehicle, m to the left.
+    offset_m: f64,
+    width_m: f64,
+}
+
+impl Own {
+    fn of_ego(around: &Around) -> Option<Own> {
+        let (route, station_m) = (&around.scene.route, around.ego_station_m);
+        let found = route.path.project_from(around.ego_outline.pose.position, station_m)?;
+        let part = route.lane_at(found.station_m);
+        let width_m = around.scene.map.lane(part.lane).width_at(found.station_m - part.from_m);
+        Some(Own { along: found.forward, offset_m: found.offset_m, width_m })
+    }
+
+    fn of_other(vehicle: &Vehicle, map: &RoadMap) -> Option<Own> {
+        let Course::Lanes(driver) = vehicle.way else { return None };
+        let found = driver.way.path.project_from(vehicle.this.outline.pose.position, driver.station_m)?;
+        let (lane, on_lane_m) = driver.way.lane_at(found.station_m);
+        Some(Own {
+            along: found.forward,
+            offset_m: found.offset_m,
+            width_m: map.lane(lane).width_at(on_lane_m),
+        })
+    }
 }
 
 impl Conduct<'_> {
@@ -242,20 +300,29 @@ impl Conduct<'_> {
             return Some(Rule::Entering);
         };
         let lane = map.lane(place.lane);
-        if lane.junction.is_some() {
-            return self.is_changing_lanes.then_some(Rule::LeavingLane);
-        }
         let along = unit_vector(lane.centre.heading_at(place.station_m));
+        let nearest = Own { along, offset_m: place.offset_m, width_m: lane.width_at(place.station_m) };
+        if lane.junction.is_some() {
+            // A long body reaches over its lane in a turn, and keeps it.
+            let drifts =
+                |own: &Own| own.along.perp(&self.velocity_mps).abs() > SIDEWAYS_MPS && self.leaves(own);
+            let own = self.own.as_ref().or(self.by_nearest.then_some(&nearest));
+            let leaves = self.is_changing_lanes || own.is_some_and(drifts);
+            return leaves.then_some(Rule::LeavingLane);
+        }
         if along.dot(&self.forward).abs() < libm::cos(TURNS_RAD) {
             return Some(Rule::TurningRound);
         }
-        let half_m = self.outline.half_extent_m(self.forward, along).1;
-        let over_m = place.offset_m.abs() + half_m - lane.width_at(place.station_m) / 2.0;
-        // By its motion, not by the word that sent it there: it is over the line, or soon will be.
-        let aside_mps = along.perp(&self.velocity_mps).abs();
+        self.leaves(&nearest).then_some(Rule::LeavingLane)
+    }
+
+    /// Whether it leaves a lane: by its motion, not by the word that sent it there. It is over the line, or soon will be.
+    fn leaves(&self, own: &Own) -> bool {
+        let half_m = self.outline.half_extent_m(self.forward, own.along).1;
+        let over_m = own.offset_m.abs() + half_m - own.width_m / 2.0;
+        let aside_mps = own.along.perp(&self.velocity_mps).abs();
         let soon_m = if aside_mps > CROSSING_MPS { aside_mps * SOON_S } else { 0.0 };
-        let moves_over = self.towards_mps > SIDEWAYS_MPS && over_m + soon_m > OVER_M;
-        moves_over.then_some(Rule::LeavingLane)
+        self.towards_mps > SIDEWAYS_MPS && over_m + soon_m > OVER_M
     }
 }
 

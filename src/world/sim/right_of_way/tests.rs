@@ -345,7 +345,7 @@ fn who_comes_into_a_lane_gives_way_unless_it_comes_behind_or_leaves_room() {
     // Who turns off in good time clears the junction, where one that changes lanes drives on ahead.
     let room = Side { apart_m: 40.0, ..SIDE };
     let by_rule = |side: Side| side.at_coming(|| None, 3.0).map(|of| (of.priority, of.rule, of.mover));
-    let turns = Some(Rule::Turning);
+    let turns = Some(Rule::TurningOff);
     for (side, priority, mover) in [
         (Side { ego_is_ahead: true, ego_does: turns, ..room }, Priority::Ego, Mover::Ego),
         (Side { other_does: turns, ..room }, Priority::Other, Mover::Other),
