@@ -329,6 +329,12 @@ impl Path {
         (nearest_m + along.dot(&away), along.perp(&away))
     }
 
+    /// How far it turns between two stations, rad to the left; more than half a turn, too.
+    pub fn turned_rad(&self, from_m: f64, to_m: f64) -> f64 {
+        let heading_rad = |part: u32| self.heading_at(from_m + (to_m - from_m) * f64::from(part) / 8.0);
+        (0..8).map(|part| wrap_angle(heading_rad(part + 1) - heading_rad(part))).sum()
+    }
+
     /// The nearest point among stations within `reach_m` of `near_m`: quicker, and does not jump
     /// to another branch where the path passes near itself.
     pub fn project_near(&self, point: Vec2, near_m: f64, reach_m: f64) -> Projection {

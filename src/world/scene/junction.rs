@@ -25,6 +25,9 @@ const OPPOSING_RAD_MIN: f64 = 135.0 * core::f64::consts::PI / 180.0;
 /// Up to this angle they come from the same side, rad.
 const ALONGSIDE_RAD_MAX: f64 = 30.0 * core::f64::consts::PI / 180.0;
 
+/// Two lanes from the same side that turn alike but for this, rad (15°), are told apart by their names. Ours.
+const ALIKE_RAD: f64 = core::f64::consts::PI / 12.0;
+
 /// One lane's part of a conflict.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Area {
@@ -129,7 +132,8 @@ pub(crate) enum Order {
 /// Where they say the same, a vehicle that turns left (right, where traffic keeps left) or round yields to oncoming
 /// traffic; otherwise the vehicle from the right
 /// goes first (Vienna Convention, article 18; so in Estonia and California). Of two from the same side,
-/// the one that turns less goes first; if they turn alike, the lane that the file names first.
+/// the one that turns less, beyond the circle or bend that both come round, goes first; if they turn alike, what turns across the
+/// road yields, and then the lane that the file names first goes first.
 pub(crate) fn order(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> (bool, Order) {
     let (signs_a, signs_b) = (map.lane(a).precedence, map.lane(b).precedence);
     if signs_a != signs_b {
@@ -148,14 +152,27 @@ pub(crate) fn order(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> (bool, Order) 
         }
     };
     let goes_before = (rank(a), a) < (rank(b), b);
+    let turns_less_by_rad = turns_rad(map, b).abs() - turns_rad(map, a).abs();
     if angle_rad.abs() > OPPOSING_RAD_MIN {
         return (goes_before, Order::Turning);
     }
     if angle_rad.abs() < ALONGSIDE_RAD_MAX {
-        return (goes_before, Order::SameSide);
+        let alike = turns_less_by_rad.abs() < ALIKE_RAD;
+        return (if alike { goes_before } else { turns_less_by_rad > 0.0 }, Order::SameSide);
     }
     // A heading turned to the left of the own one comes from the right.
     (angle_rad < 0.0, Order::FromTheRight)
+}
+
+/// How far a lane turns beyond what its approach turned over the same length, rad to the left: who goes on round a circle does not
+/// turn, and who leaves it does.
+fn turns_rad(map: &RoadMap, index: LaneIndex) -> f64 {
+    let lane = &map.lane(index).centre;
+    let length_m = lane.length_m();
+    let before = map.lane(index).predecessors.first().map(|before| &map.lane(*before).centre);
+    let before_rad =
+        before.map_or(0.0, |before| before.turned_rad(before.length_m() - length_m, before.length_m()));
+    lane.turned_rad(0.0, length_m) - before_rad
 }
 
 /// A conflict area on the ego vehicle's route.

@@ -267,7 +267,8 @@ struct Own {
 impl Own {
     fn of_ego(around: &Around) -> Option<Own> {
         let (route, station_m) = (&around.scene.route, around.ego_station_m);
-        let found = route.path.project_from(around.ego_outline.pose.position, station_m)?;
+        // By the rear axle, which moves where it looks: in a turn the middle looks elsewhere.
+        let found = route.path.project_from(around.ego.rear_axle.position, station_m)?;
         let part = route.lane_at(found.station_m);
         let width_m = around.scene.map.lane(part.lane).width_at(found.station_m - part.from_m);
         Some(Own { along: found.forward, offset_m: found.offset_m, width_m })

@@ -19,8 +19,6 @@ pub(super) const BEFORE_M: f64 = 5.0;
 const BESIDE_M: f64 = 1.0;
 /// A vehicle that looks so far to the side has begun to turn off, rad (6°). Ours.
 const BEGUN_RAD: f64 = core::f64::consts::PI / 30.0;
-/// Headings along a way are compared at so many places, so that a turn round is told from none.
-const PARTS: u32 = 8;
 
 /// The ego vehicle at a junction, and another vehicle near it.
 pub(super) struct Pair<'a> {
@@ -140,14 +138,7 @@ impl Turn {
 
 /// How far a path turns on a stretch beyond what it turned before, rad to the left: who goes on round a circle does not turn.
 fn turns_rad(path: &Path, from_m: f64, length_m: f64) -> f64 {
-    turned_rad(path, (from_m, from_m + length_m)) - turned_rad(path, (from_m - length_m, from_m))
-}
-
-/// How far a path turns between two stations, rad to the left.
-fn turned_rad(path: &Path, (from_m, to_m): (f64, f64)) -> f64 {
-    let heading_rad =
-        |part: u32| path.heading_at(from_m + (to_m - from_m) * f64::from(part) / f64::from(PARTS));
-    (0..PARTS).map(|part| wrap_angle(heading_rad(part + 1) - heading_rad(part))).sum()
+    path.turned_rad(from_m, from_m + length_m) - path.turned_rad(from_m - length_m, from_m)
 }
 
 #[cfg(test)]
