@@ -3,8 +3,8 @@
 //!
 //! The typology has 37 types, in an order in which the first that fits applies. It is about what both parties did before it
 //! became critical; here that is the last 5 s. How places, angles and speeds tell the types apart is ours. An evasive action goes
-//! before the types of lane changes, which it would else be; of type 34, incidents without a collision, a load that falls
-//! onto the road is the one that this world has; a vehicle that had crashed before is a kind of its own.
+//! before the types of lane changes, which it would be otherwise. Type 34 is incidents without a collision: here that is a load that
+//! falls onto the road. A vehicle that had crashed before is a kind of its own.
 
 use avastra_base::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 use avastra_base::kinematics::STANDING_MPS;
@@ -30,8 +30,8 @@ const EVADES_M: f64 = 1.2;
 const IN_THE_WAY_M: f64 = 1.5;
 /// Two that came nearer by less, sideways, just were there, m. Ours.
 const COMES_M: f64 = 0.5;
-/// A vehicle that was slower sideways, and has not changed lanes, drifts, m/s: unintended departures are tested up to 0.6 m/s, lane changes are driven
-/// at 1 m/s and more. Ours.
+/// A vehicle that was slower sideways, and has not changed lanes, drifts, m/s. Unintended departures are tested up to 0.6 m/s, lane
+/// changes are driven at 1 m/s and more. Ours.
 const CHANGES_MPS: f64 = 1.0;
 /// What would be reached later than this is passed and not evaded, s: a driver's reaction and braking. Ours.
 const LATE_S: f64 = 2.5;

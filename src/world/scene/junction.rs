@@ -131,9 +131,11 @@ pub(crate) enum Order {
 /// Signs decide first: a priority road before a lane without signs, and that before a stop or yield sign.
 /// Where they say the same, a vehicle that turns left (right, where traffic keeps left) or round yields to oncoming
 /// traffic; otherwise the vehicle from the right
-/// goes first (Vienna Convention, article 18; so in Estonia and California). Of two from the same side,
-/// the one that turns less, beyond the circle or bend that both come round, goes first; if they turn alike, what turns across the
-/// road yields, and then the lane that the file names first goes first.
+/// goes first (Vienna Convention, article 18; so in Estonia and California).
+///
+/// If both come from the same side, the one that turns less goes first. A circle or a bend that both come round is no turn
+/// ([`turns_rad`]). If they turn alike, a vehicle that turns across the road yields; otherwise the lane that the file names first
+/// goes first.
 pub(crate) fn order(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> (bool, Order) {
     let (signs_a, signs_b) = (map.lane(a).precedence, map.lane(b).precedence);
     if signs_a != signs_b {
@@ -164,8 +166,8 @@ pub(crate) fn order(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> (bool, Order) 
     (angle_rad < 0.0, Order::FromTheRight)
 }
 
-/// How far a lane turns beyond what its approach turned over the same length, rad to the left: who goes on round a circle does not
-/// turn, and who leaves it does.
+/// How far a lane turns beyond what its approach turned over the same length, rad to the left. A vehicle that goes on round a circle
+/// does not turn, and one that leaves it does. `turning.rs` asks the same of ways.
 fn turns_rad(map: &RoadMap, index: LaneIndex) -> f64 {
     let lane = &map.lane(index).centre;
     let length_m = lane.length_m();

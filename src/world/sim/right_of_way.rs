@@ -387,7 +387,7 @@ impl Rights {
             && (strip.aside_m < if walks { BESIDE_M } else { 0.0 } || walks && is_on_road());
         if shares {
             let known = self.meeting.filter(|_| self.shares == Some(true)).map(|meeting| meeting.ruling);
-            // Who comes onto a crosswalk, or stays beside the road that the ego vehicle leaves, and no longer does.
+            // What was found holds until such a rule begins, or until the ego vehicle is back on the road.
             let now = whatever_the_room(this, &strip, around);
             let is_other = |known: &Ruling| match now {
                 Some(rule) => known.rule != rule,

@@ -113,15 +113,15 @@ impl<'a> Vehicle<'a> {
                     (found.distance_m < ON_LANE_M && turned > ALONG_COS)
                         .then_some(found.station_m - on_lane_m)
                 };
-                // It comes along the lane, or begins on it, and does not come from another arm.
-                let begin = path.project(lane.points()[0].position);
-                if begin.station_m > 0.0 && begin.distance_m > ON_LANE_M {
-                    return None;
-                }
                 let middle_m = (area.other_from_m + area.other_to_m) / 2.0;
                 let begin_m = along(middle_m)?;
                 along(area.other_from_m)?;
                 along(area.other_to_m)?;
+                // It comes along the lane, or begins on it: one from another arm may end along it.
+                let begin = path.project(lane.points()[0].position);
+                if begin.station_m > 0.0 && begin.distance_m > ON_LANE_M {
+                    return None;
+                }
                 (station_m, begin_m)
             }
             Course::Nowhere => return None,

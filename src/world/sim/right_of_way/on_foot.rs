@@ -62,8 +62,8 @@ pub(super) fn on_foot(this: &Obstacle, strip: &Strip, around: &Around) -> Ruling
     }
 }
 
-/// The rule by which the ego vehicle gives way however late somebody came: to who is on a crosswalk, and to who stays beside the
-/// road that it leaves.
+/// The rule by which the ego vehicle gives way, however little room it has: to a person on a crosswalk, and to a body that stays
+/// beside the road where the ego vehicle leaves it.
 pub(super) fn whatever_the_room(this: &Obstacle, strip: &Strip, around: &Around) -> Option<Rule> {
     let mut crosswalks = around.scene.route.crosswalks_m.iter().filter(|_| this.body != Body::Object);
     let at = |(from_m, to_m): &&(f64, f64)| (from_m - KERB_M..to_m + KERB_M).contains(&strip.station_m);

@@ -1,7 +1,7 @@
 //! Two vehicles that come to a junction side by side, of which one turns off across the other's way (articles 11 and 16).
 //!
-//! A vehicle that turns off lets pass who goes straight on beside it, on the road or on a way of their own. Where it turns
-//! across the road, nobody overtakes it on that side: in its own lane, or in one for oncoming traffic.
+//! A vehicle that turns off gives way to one that goes straight on beside it, on the road or on a path of its own. Where it turns
+//! across the road, the other may not overtake it on that side: in its lane, or in one for oncoming traffic.
 
 use avastra_base::geometry::{Path, Pose, Vec2, wrap_angle};
 use avastra_road::{RoadMap, Route, RouteLane};
@@ -27,7 +27,7 @@ pub(super) struct Pair<'a> {
     /// A lane of the route in the junction.
     pub inside: RouteLane,
     pub ego: Moving,
-    /// Station of the middle of the ego vehicle, m.
+    /// Station of the rear axle of the ego vehicle, m.
     pub ego_station_m: f64,
     pub other: Moving,
     /// The way of the other, and the station of its middle on it, m.
