@@ -104,13 +104,15 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
     }
     let changes = changes(&scenes);
     let (scenarios, title) = (scenes.len(), found.title.clone());
+    let copies = scenes.iter().filter(|scene| scene.shrunk_from.is_some()).count();
     let compared_with = arguments.ads.clone();
     let html = Page { title, overview: found.overview, remarks, scenes, compared_with }.html();
     write_result(arguments.output.as_ref(), &path, &html)?;
     output.say(&format!(
-        "{}: {}, {:.1} MB; open it with a browser",
+        "{}: {}{}, {:.1} MB; open it with a browser",
         path.shown(),
         plural(scenarios, "scenario"),
+        if copies > 0 { format!(", {copies} of them shrunk from another") } else { String::new() },
         html.len() as f64 / 1e6
     ));
     if let Some(other) = &arguments.ads {
@@ -119,7 +121,7 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
         output.say(&format!("with {other}: {}", told.join(", ")));
     }
     output.result(serde_json::json!({
-        "page": path, "scenarios": scenarios, "left_out": left_out, "bytes": html.len(), "refuted": refuted,
+        "page": path, "scenarios": scenarios, "shrunk": copies, "left_out": left_out, "bytes": html.len(), "refuted": refuted,
         "compared": arguments.ads.as_ref().map(|_| changes), "failed": failed,
     }));
     played.map_or(Ok(()), |played| played.complete("played"))?;

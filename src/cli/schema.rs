@@ -268,6 +268,7 @@ test
 report
   page text its path
   scenarios number on the page
+  shrunk number of them, those in a folder of shrunk copies
   left_out number scenarios beyond `--most`
   bytes number size of the page
   refuted number claims that do not hold: what only further plays show is not tried

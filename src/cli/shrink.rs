@@ -27,6 +27,9 @@ pub const FOLDER: &str = "shrunk";
 /// What the name of a shrunk scenario ends with.
 const SUFFIX: &str = "_shrunk";
 
+/// A finding that comes sooner or later by more than this is told to come at another time, s.
+const MOVED_S: f64 = 0.5;
+
 /// The name of the scenario that was found, by that of the shrunk one.
 pub fn found_name(shrunk: &str) -> &str {
     shrunk.strip_suffix(SUFFIX).unwrap_or(shrunk)
@@ -137,6 +140,7 @@ impl Small {
             .zip(after.impact_mps)
             .map(|(before, after)| format!("impact {:.1} → {:.1} km/h", 3.6 * before, 3.6 * after));
         let margin = before.margin.zip(after.margin);
+        let moved = (before.time_s - after.time_s).abs() > MOVED_S;
         let again = match (before.recurrence, after.recurrence) {
             (Some(before), Some(after)) => {
                 format!("recurs in {before} → {after}{}", mixed_text(self.is_mixed))
@@ -147,6 +151,7 @@ impl Small {
             Some(format!("kept: {}", kept.join(", "))),
             impact,
             margin.map(|(before, after)| format!("margin {before:.2} → {after:.2}")),
+            moved.then(|| format!("at {:.1} → {:.1} s", before.time_s, after.time_s)),
             Some(again),
         ];
         told.into_iter().flatten().collect::<Vec<_>>().join("; ")

@@ -143,6 +143,14 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
             plural(cases.len(), "scenario")
         ));
     }
+    let is_unmet = |case: &&Case| matches!(case.outcome, Outcome::Played(Regression::NeverMet));
+    let unmet = cases.iter().filter(is_unmet).count();
+    if unmet > 0 {
+        output.warn(&format!(
+            "{unmet} of {}: the obstacle never appears, so nothing was tested there; `replay` shows why",
+            plural(cases.len(), "scenario")
+        ));
+    }
     let others = cases.iter().filter_map(|case| case.by.found_with.as_deref());
     let found_with: BTreeSet<&str> = others.clone().collect();
     if !found_with.is_empty() {

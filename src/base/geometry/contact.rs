@@ -67,7 +67,8 @@ impl Sweep {
         self.end.position - self.start.pose.position
     }
 
-    fn turn_rad(&self) -> f64 {
+    /// By how much it turns, rad to the left.
+    pub fn turn_rad(&self) -> f64 {
         wrap_angle(self.end.heading_rad - self.start.pose.heading_rad)
     }
 

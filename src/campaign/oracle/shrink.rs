@@ -51,6 +51,8 @@ pub struct Shrunk {
 /// What makes a finding worth keeping.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Worth {
+    /// When it happens, s since the episode began.
+    pub time_s: f64,
     /// Speed at which the gap closed, m/s; `None` of a breach.
     pub impact_mps: Option<f64>,
     /// `None` of a breach.
@@ -70,6 +72,7 @@ impl Worth {
                 let collision = &log.collisions[index];
                 let severity = severity(collision);
                 Worth {
+                    time_s: collision.contact.time_s,
                     impact_mps: Some(severity.closing_speed_mps),
                     harm: Some(severity.harm.name()),
                     kind: Some(collision.kind.name()),
@@ -79,8 +82,9 @@ impl Worth {
                 }
             }
             Found::Breach(index) => {
-                let margin = log.breaches[index].margin;
-                Worth { impact_mps: None, harm: None, kind: None, priority: None, margin, recurrence }
+                let breach = &log.breaches[index];
+                let (time_s, margin) = (breach.time_s, breach.margin);
+                Worth { time_s, impact_mps: None, harm: None, kind: None, priority: None, margin, recurrence }
             }
         }
     }

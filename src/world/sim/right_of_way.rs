@@ -22,7 +22,7 @@
 //! room to brake gently has given way, and has from now on priority over it: a vehicle that is in a junction may clear
 //! it (18.6), and one that follows keeps its distance (13.5); that both make a priority is ours. What is abrupt,
 //! UN R79 says for lane changes: more than 3 m/s² after 0.4 s, to stay the way of a second behind. So a vehicle that
-//! cuts in and stops before the one behind it has its distance back has not given way. A vehicle that waits in a
+//! cuts in and stops before the one behind it has its distance back, or could have stopped, has not given way. A vehicle that waits in a
 //! junction beside the other's way and then sets out comes anew. A vehicle that passed
 //! red, late yellow or its stop sign has not given way, however early it came. If that was the other vehicle, and the ego vehicle
 //! had time to brake, neither has priority.
@@ -159,21 +159,33 @@ struct Meeting {
     tick: u64,
     /// Whether the first of the two, which may clear the junction, waits beside the other's way.
     waits: bool,
+    /// When the one behind could have come to rest by braking gently, s since the episode began; never in a junction.
+    rests_s: f64,
 }
 
 impl Meeting {
+    /// In a lane, or on foot on the carriageway.
+    fn in_lane(ruling: Ruling, tick: u64) -> Meeting {
+        Meeting { place: Place::Lane, ruling, tick, waits: false, rests_s: f64::INFINITY }
+    }
+
+    /// Whether the two were in each other's way a short time ago.
+    fn holds(&self, tick: u64) -> bool {
+        (tick - self.tick) as f64 * DT_S <= HOLDS_S
+    }
+
     /// Whether the first of the two left the other room, and may clear the junction.
     fn is_clearing(&self) -> bool {
         self.ruling.rule == Rule::Clearing
     }
 
-    /// Whether what was found in a lane holds no longer.
-    fn is_over(&self, side: &Side) -> bool {
+    /// Whether what was found in a lane holds no longer: the one behind has its distance back, or had the time to stop.
+    fn is_over(&self, side: &Side, time_s: f64) -> bool {
         match self.ruling.rule {
             Rule::Clearing => side.backs(self.ruling.mover),
             // Of one that turns across another's way; they do not follow each other.
             Rule::Overtaking => false,
-            _ => side.is_gentle(),
+            _ => side.is_gentle() || side.along > 0.0 && time_s > self.rests_s,
         }
     }
 }
@@ -245,8 +257,7 @@ impl Rights {
 
     /// What was found about the two, as long as it holds.
     fn held(&self, tick: u64) -> Option<Ruling> {
-        let holds = |meeting: &Meeting| (tick - meeting.tick) as f64 * DT_S <= HOLDS_S;
-        self.meeting.filter(holds).map(|meeting| meeting.ruling)
+        self.meeting.filter(|meeting| meeting.holds(tick)).map(|meeting| meeting.ruling)
     }
 
     /// Who had priority, now that the road user, which has crashed, and the ego vehicle touch.
@@ -286,8 +297,8 @@ impl Rights {
     }
 
     pub fn trace(&self, trace: &mut Trace) {
-        // What was found on the road follows from the pedestrian's position; a rule, its moment and whether a vehicle
-        // waits from what was traced before.
+        // What was found on the road follows from the pedestrian's position; a rule, its moments and whether a
+        // vehicle waits from what was traced before.
         let Rights { passed, shares, meeting, wreck, foreseen, on_road: _ } = self;
         passed.trace(trace);
         trace.flags([
@@ -298,7 +309,7 @@ impl Rights {
             foreseen.is_some(),
         ]);
         trace.words(wreck.map(|(priority, _)| priority as u64));
-        if let Some(Meeting { place, ruling, tick, waits: _ }) = *meeting {
+        if let Some(Meeting { place, ruling, tick, waits: _, rests_s: _ }) = *meeting {
             let (ego, other) = match place {
                 Place::Area(ego, other) => (ego.0 as u64, other.0 as u64),
                 Place::Lane => (u64::MAX, u64::MAX),
@@ -331,6 +342,7 @@ impl Rights {
                 ruling: found.ruling([ego_passed, &self.passed], vehicle.has_siren, around),
                 tick: around.tick,
                 waits: false,
+                rests_s: f64::INFINITY,
             };
             let known = self.meeting.filter(|meeting| meeting.place == place);
             let mut meeting = known.unwrap_or_else(judged);
@@ -354,13 +366,19 @@ impl Rights {
         let began = shares && self.shares == Some(false);
         self.shares = Some(shares);
         let Some(side) = side.filter(|_| shares) else { return };
+        let time_s = around.time_s();
+        // Two that come into each other's way anew are judged anew.
+        self.meeting = self.meeting.filter(|meeting| meeting.holds(around.tick));
         match &mut self.meeting {
             // There was time to brake gently since: from now on it is one vehicle behind another.
-            Some(meeting) if meeting.place == Place::Lane && meeting.is_over(&side) => self.meeting = None,
+            Some(meeting) if meeting.place == Place::Lane && meeting.is_over(&side, time_s) => {
+                self.meeting = None
+            }
             Some(meeting) if meeting.place == Place::Lane => meeting.tick = around.tick,
             Some(_) | None if began => {
-                let ruling = side.at_coming(|| beyond_middle(this, around, None), around.time_s());
-                let found = |ruling| Meeting { place: Place::Lane, ruling, tick: around.tick, waits: false };
+                let ruling = side.at_coming(|| beyond_middle(this, around, None), time_s);
+                let rests_s = time_s + side.rests_in_s();
+                let found = |ruling| Meeting { rests_s, ..Meeting::in_lane(ruling, around.tick) };
                 self.meeting = ruling.map(found).or(self.meeting);
             }
             Some(_) | None => {}
@@ -401,7 +419,7 @@ impl Rights {
                 Some(known) => known,
                 None => on_foot(this, &strip, around),
             };
-            self.meeting = Some(Meeting { place: Place::Lane, ruling, tick: around.tick, waits: false });
+            self.meeting = Some(Meeting::in_lane(ruling, around.tick));
         }
         self.shares = Some(shares);
     }

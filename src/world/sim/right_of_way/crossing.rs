@@ -258,7 +258,7 @@ fn by_rules(lanes: [LaneIndex; 2], passed: [&Passed; 2], around: &Around) -> (Pr
 /// Whether a vehicle drives into a junction across the route of the ego vehicle, which goes first there.
 pub(super) fn cuts_across(vehicle: &Vehicle, passed: [&Passed; 2], around: &Around) -> bool {
     // One that has stood before the junction and sets out shows its intention before it is in it.
-    let within_m = if passed[1].just_stood(around).is_some() { SETS_OUT_M } else { 0.0 };
+    let within_m = if passed[1].has_just_stood(around) { SETS_OUT_M } else { 0.0 };
     if vehicle.speed_mps < STANDING_MPS || vehicle.has_siren || !vehicle.is_entering(within_m, around) {
         return false;
     }

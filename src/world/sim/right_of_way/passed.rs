@@ -18,6 +18,8 @@ const YELLOW_BRAKING_MPS2: f64 = 3.5;
 const STOOD_MPS: f64 = 0.3;
 /// To have stood before a sign means within this time, s.
 const STOOD_S: f64 = 5.0;
+/// One that moves for less than this and stands again stood all along, s. Ours.
+const CREEP_S: f64 = 0.5;
 /// Of two that stood at their signs, one was first if it stood earlier by more than this, s. Ours.
 const FIRST_S: f64 = 1.0;
 
@@ -41,8 +43,15 @@ struct PassedLight {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct PassedSign {
     lane: LaneIndex,
-    /// When it last stood before the line, ticks; `None` if it did not.
+    /// Since when it stood before the line, ticks; `None` if it did not stand.
     stood: Option<u64>,
+}
+
+/// A stop of a vehicle, from its first tick to its last.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Stand {
+    from: u64,
+    to: u64,
 }
 
 /// The lines that a vehicle passed last.
@@ -50,8 +59,8 @@ struct PassedSign {
 pub(in crate::sim) struct Passed {
     light: Option<PassedLight>,
     sign: Option<PassedSign>,
-    /// When it last stood, ticks.
-    stood: Option<u64>,
+    /// Where it stood last, or stands.
+    stand: Option<Stand>,
 }
 
 impl Passed {
@@ -72,7 +81,7 @@ impl Passed {
                 Some(PassedLight { signal: line.signal, shown: shown(line.signal, speed_mps, around) });
         }
         if let Some((_, lane)) = stops.find(|(station_m, _)| passed.contains(station_m)) {
-            self.sign = Some(PassedSign { lane, stood: self.just_stood(around) });
+            self.sign = Some(PassedSign { lane, stood: self.just_stood(around).map(|stand| stand.from) });
         }
     }
 
@@ -114,13 +123,19 @@ impl Passed {
 
     fn note_standing(&mut self, speed_mps: f64, around: &Around) {
         if speed_mps <= STOOD_MPS {
-            self.stood = Some(around.tick);
+            let goes_on = |stand: &Stand| around.tick - stand.to <= ticks(CREEP_S);
+            let from = self.stand.filter(goes_on).map_or(around.tick, |stand| stand.from);
+            self.stand = Some(Stand { from, to: around.tick });
         }
     }
 
-    /// When the vehicle last stood, ticks; `None` if that is longer ago than a few seconds.
-    pub(super) fn just_stood(&self, around: &Around) -> Option<u64> {
-        self.stood.filter(|tick| around.tick - tick <= ticks(STOOD_S))
+    /// Whether the vehicle has stood within a few seconds.
+    pub(super) fn has_just_stood(&self, around: &Around) -> bool {
+        self.just_stood(around).is_some()
+    }
+
+    fn just_stood(&self, around: &Around) -> Option<Stand> {
+        self.stand.filter(|stand| around.tick - stand.to <= ticks(STOOD_S))
     }
 
     /// Whether the vehicle passed the light of a lane in a junction though it could have stopped, or still has it red
@@ -150,7 +165,7 @@ impl Passed {
 
     /// Signs are left out: what is known of them follows from what was traced before.
     pub fn trace(&self, trace: &mut Trace) {
-        let Passed { light, sign: _, stood: _ } = self;
+        let Passed { light, sign: _, stand: _ } = self;
         let code = |light: &PassedLight| match light.shown {
             Shown::Free => 0,
             Shown::Red => 1,
@@ -175,7 +190,7 @@ enum Stop {
     /// It has not passed it yet.
     Ahead,
     Ran,
-    /// It stood before it, at this tick.
+    /// It stood before it, since this tick.
     Stood(u64),
 }
 
@@ -319,13 +334,30 @@ mod tests {
         let mut world = World::new(scene, &testing::start());
         let mut passed = Passed::default();
         passed.note_standing(0.4, &world.alone());
-        assert_eq!(passed.just_stood(&world.alone()), None, "0.4 m/s is no stand");
+        assert!(!passed.has_just_stood(&world.alone()), "0.4 m/s is no stand");
         passed.note_standing(0.3, &world.alone());
         for _ in 0..250 {
             world.tick(&crate::sim::tests::hold(&world, 5.0));
         }
-        assert_eq!(passed.just_stood(&world.alone()), Some(0));
+        assert!(passed.has_just_stood(&world.alone()));
         world.tick(&crate::sim::tests::hold(&world, 5.0));
-        assert_eq!(passed.just_stood(&world.alone()), None);
+        assert!(!passed.has_just_stood(&world.alone()));
+    }
+
+    /// Of two at their signs the one goes first that came to stand first, however long it waits.
+    #[test]
+    fn a_stand_counts_from_its_beginning_and_a_creep_does_not_end_it() {
+        let mut world = World::new(testing::crossing(), &testing::start());
+        let mut passed = Passed::default();
+        let mut since = Vec::new();
+        for tick in 0..200 {
+            // It stands from the start, creeps for 0.4 s, and sets out for 1 s before it stands again.
+            let moves = (60..80).contains(&tick) || (100..150).contains(&tick);
+            passed.note_standing(if moves { 1.0 } else { 0.0 }, &world.alone());
+            since.push(passed.just_stood(&world.alone()).map(|stand| stand.from));
+            world.tick(&crate::sim::tests::hold(&world, 5.0));
+        }
+        assert_eq!([since[0], since[59], since[99], since[149]], [Some(0); 4]);
+        assert_eq!([since[150], since[199]], [Some(150); 2]);
     }
 }

@@ -7,7 +7,7 @@ use avastra_road::RoadMap;
 
 use super::crossing::{Course, Vehicle};
 use super::turning::{BEFORE_M, Moving, Pair, TURNS_RAD};
-use super::{ABRUPT_MPS2, Mover, Rule, Ruling, SIDEWAYS_MPS, allowed_mps, can_stop};
+use super::{ABRUPT_MPS2, Mover, REACTION_S, Rule, Ruling, SIDEWAYS_MPS, allowed_mps, can_stop};
 use crate::sim::around::Around;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::road_user::Obstacle;
@@ -135,8 +135,16 @@ impl Side {
 
     /// Whether the vehicle behind stops before the one ahead if it brakes gently.
     fn can_stop_before(&self) -> bool {
-        let behind_mps = if self.ego_is_ahead { self.other_mps } else { self.allowed_mps };
-        self.apart_m > 0.0 && can_stop(behind_mps.max(0.0), self.apart_m, ABRUPT_MPS2)
+        self.apart_m > 0.0 && can_stop(self.behind_mps(), self.apart_m, ABRUPT_MPS2)
+    }
+
+    /// Time until the vehicle behind is at rest if it brakes gently, s.
+    pub fn rests_in_s(&self) -> f64 {
+        REACTION_S + self.behind_mps() / ABRUPT_MPS2
+    }
+
+    fn behind_mps(&self) -> f64 {
+        if self.ego_is_ahead { self.other_mps.max(0.0) } else { self.allowed_mps.max(0.0) }
     }
 
     /// Whether the one of the two that has given way, and may clear the junction, backs up instead.

@@ -221,6 +221,12 @@ fn one_who_cuts_in_and_stops_has_not_given_way_before_the_distance_is_back() {
     // What was found stays while it brakes to rest, and until there is room to brake gently for it.
     assert!(!side(4.0, 10.0).is_gentle() && !side(6.0, 5.0).is_gentle() && !side(4.0, 0.0).is_gentle());
     assert!(side(22.0, 0.0).is_gentle());
+    // Who is still as near once it could have stopped follows the other: 0.4 s, and 10 m/s at 3 m/s².
+    let ruling = side(4.0, 10.0).at_coming(|| None, 0.0).expect("it cut in");
+    let rests_s = side(4.0, 10.0).rests_in_s();
+    let meeting = Meeting { rests_s, ..Meeting::in_lane(ruling, 0) };
+    assert_eq!([3.7, 3.8].map(|time_s| meeting.is_over(&side(4.0, 10.0), time_s)), [false, true]);
+    assert!(!meeting.is_over(&Side { along: -1.0, ..side(4.0, 10.0) }, 9.0), "they come towards each other");
 }
 
 #[test]
