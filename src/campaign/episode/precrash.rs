@@ -266,6 +266,11 @@ impl Way {
         self.steps[last..].iter().all(|step| step.place.speed_mps() < STANDING_MPS)
     }
 
+    /// Whether it has stood all the time.
+    fn stands(&self) -> bool {
+        self.steps.iter().all(|step| step.place.speed_mps() < STANDING_MPS)
+    }
+
     fn manoeuvre_until(&self, step: usize) -> Option<Manoeuvre> {
         let turns = self.steps[..=step].iter().any(|step| step.in_junction);
         match self.shape_until(step) {
@@ -438,6 +443,8 @@ impl Before {
                 PreCrash::ManoeuvreOppositeDirection
             }
             (true, _) => PreCrash::NoManoeuvreOppositeDirection,
+            // Across the lane, as after a crash or a turn that got stuck.
+            _ if !self.in_junction && self.other.stands() => PreCrash::LeadStopped,
             (false, true) if turns_right => PreCrash::RightTurnSignalized,
             (false, false) if turns_left || turns_right => PreCrash::TurningNonSignalized,
             (false, false) => PreCrash::StraightCrossingPaths,

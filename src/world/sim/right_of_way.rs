@@ -289,6 +289,12 @@ impl Rights {
         };
         let none = Ruling { time_s: around.time_s(), ..Ruling::default() };
         let ruling = ruling.unwrap_or(none);
+        // Whichever way it stands, who drives comes to it (13.1). Had it come too late, a rule would say so.
+        let stands = this.body.is_vehicle() && this.velocity_mps.norm() < STANDING_MPS;
+        if ruling.rule == Rule::None && stands && around.ego.speed_mps >= STANDING_MPS {
+            let rule = Rule::Standing;
+            return Ruling { priority: Priority::Other, rule, mover: Mover::Ego, ..ruling };
+        }
         // A driver must be able to stop for anything that can be foreseen (13.1), so then neither has priority.
         if could_stop && ruling.priority == Priority::Ego {
             return Ruling { priority: Priority::None, rule: duty, ..ruling };

@@ -1,10 +1,12 @@
 //! Pedestrians, animals and things: which come onto the carriageway or into the ego vehicle's way.
 
-use avastra_base::geometry::{Pose, Vec2};
+use avastra_base::geometry::{Pose, Vec2, wrap_angle};
 use avastra_base::kinematics::CAREFUL_BRAKING_MPS2;
 use avastra_lang::model::vocabulary::{Body, Priority};
+use avastra_road::{RouteLane, StopLine};
 
 use super::side::OVER_M;
+use super::turning::TURNS_RAD;
 use super::{APPROACH_M, Mover, Rule, Ruling, allowed_mps, can_stop};
 use crate::sim::around::Around;
 use crate::sim::ego::VehicleParameters;
@@ -13,7 +15,7 @@ use crate::state::sensed::SignalColour;
 
 /// A pedestrian this near to a crosswalk is on it or about to step on it, m. Ours.
 const KERB_M: f64 = 1.0;
-/// A light this far before a crosswalk holds for it, m. Ours.
+/// A light this far before a crosswalk holds for it, and that of a junction this far before it, m. Ours.
 const LIGHT_M: f64 = 12.0;
 
 /// A body that moves faster across the road steps onto it, m/s. Ours.
@@ -88,10 +90,21 @@ fn ego_leaves_road_to(this: &Obstacle, strip: &Strip, around: &Around) -> bool {
     ego.corners().iter().filter(is_there).any(|corner| is_off(*corner, &ego.pose, OVER_M))
 }
 
-/// The colour of the light before a crosswalk of the route, which begins at a station; green if one of several is.
+/// The colour of the light that holds for a crosswalk of the route, which begins at a station; green if one of several is. Whoever drives
+/// straight on through a junction has the same light for the crosswalk behind it: people there wait.
 pub(in crate::sim) fn light_before(crosswalk_m: f64, around: &Around) -> Option<SignalColour> {
-    let lines = around.scene.route.stop_lines.iter();
-    let lines = lines.filter(|line| (crosswalk_m - LIGHT_M..crosswalk_m).contains(&line.station_m));
-    let colours = lines.map(|line| around.signals.colour(&around.scene.map, line.signal, around.tick));
-    colours.max_by_key(|colour| *colour == SignalColour::Green)
+    let (map, route) = (&around.scene.map, &around.scene.route);
+    let before = || route.stop_lines.iter().filter(|line| line.station_m < crosswalk_m);
+    let colour = |line: &StopLine| around.signals.colour(map, line.signal, around.tick);
+    let near = before().filter(|line| line.station_m >= crosswalk_m - LIGHT_M).map(colour);
+    near.max_by_key(|colour| *colour == SignalColour::Green).or_else(|| {
+        let line = before().next_back()?;
+        let heading_rad = |station_m: f64| route.path.pose_at(station_m).heading_rad;
+        let turned_rad = wrap_angle(heading_rad(crosswalk_m) - heading_rad(line.station_m)).abs();
+        let junction = map.signals[line.signal].junction?;
+        let is_inside =
+            |part: &&RouteLane| part.enter_m < crosswalk_m && map.lane(part.lane).junction == Some(junction);
+        let is_behind = crosswalk_m - route.lanes.iter().rfind(is_inside)?.to_m < LIGHT_M;
+        (turned_rad < TURNS_RAD && is_behind).then(|| colour(line))
+    })
 }

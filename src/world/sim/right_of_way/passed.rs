@@ -8,7 +8,7 @@ use super::Rule;
 use crate::sim::around::Around;
 use crate::sim::road_user::{Moved, Obstacle};
 use crate::state::sensed::SignalColour;
-use crate::state::time::ticks;
+use crate::state::time::{DT_S, ticks};
 use crate::state::trace::Trace;
 
 /// A driver needs this long to react to yellow, s: the time by which yellow is set (ITE; German RiLSA), as is the braking.
@@ -18,8 +18,11 @@ const YELLOW_BRAKING_MPS2: f64 = 3.5;
 const STOOD_MPS: f64 = 0.3;
 /// To have stood before a sign means within this time, s.
 const STOOD_S: f64 = 5.0;
-/// One that moves for less than this and stands again stood all along, s. Ours.
-const CREEP_S: f64 = 0.5;
+/// To have stood at a line means no farther before it than this, m: no car fits in between. One that moves on by less stands there still.
+/// Ours.
+const AT_LINE_M: f64 = 5.0;
+/// A front that reaches over a stop line by less has not passed it, m. Ours: drivers see no line that is under them.
+const OVER_LINE_M: f64 = 0.5;
 /// Of two that stood at their signs, one was first if it stood earlier by more than this, s. Ours.
 const FIRST_S: f64 = 1.0;
 
@@ -47,11 +50,13 @@ struct PassedSign {
     stood: Option<u64>,
 }
 
-/// A stop of a vehicle, from its first tick to its last.
+/// A stop of a vehicle, from its first tick to its last; it may have inched up in between.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Stand {
     from: u64,
     to: u64,
+    /// How far it has gone since each of the two, m.
+    gone_m: [f64; 2],
 }
 
 /// The lines that a vehicle passed last.
@@ -59,13 +64,12 @@ struct Stand {
 pub(in crate::sim) struct Passed {
     light: Option<PassedLight>,
     sign: Option<PassedSign>,
-    /// Where it stood last, or stands.
     stand: Option<Stand>,
 }
 
 impl Passed {
-    /// Notes the lines that lie between two stations of a front: lights, and stop signs with the lanes that they stand on.
-    /// `speed_mps`: of the vehicle.
+    /// Notes the lines that lie between two stations of a front: lights, and stop signs with the lanes that they stand on,
+    /// a little later. `speed_mps`: of the vehicle.
     pub fn pass(
         &mut self,
         lights: &[StopLine],
@@ -75,14 +79,8 @@ impl Passed {
         around: &Around,
     ) {
         self.note_standing(speed_mps, around);
-        let passed = from_m..to_m;
-        if let Some(line) = lights.iter().rfind(|line| passed.contains(&line.station_m)) {
-            self.light =
-                Some(PassedLight { signal: line.signal, shown: shown(line.signal, speed_mps, around) });
-        }
-        if let Some((_, lane)) = stops.find(|(station_m, _)| passed.contains(station_m)) {
-            self.sign = Some(PassedSign { lane, stood: self.just_stood(around).map(|stand| stand.from) });
-        }
+        self.pass_light(lights, (from_m, to_m), speed_mps, around);
+        self.pass_sign(&mut stops, (from_m - OVER_LINE_M, to_m - OVER_LINE_M), around);
     }
 
     /// As [`Passed::pass`], of a vehicle that keeps to no lanes: the lines are those of the lane under its front.
@@ -94,12 +92,45 @@ impl Passed {
             return;
         }
         let map = &around.scene.map;
-        let front = this.outline.pose.offset(this.outline.half_length_m, 0.0);
-        let Some(place) = map.nearest(front.position, front.heading_rad, 0.0) else { return };
-        let lane = map.lane(place.lane);
-        let stops = lane.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
-        let stops = stops.map(|line| (line.station_m, place.lane));
-        self.pass(&lane.stop_lines, stops, (place.station_m, place.station_m + along_m), speed_mps, around);
+        let front_m = this.outline.half_length_m;
+        let lane_at = |ahead_m: f64| {
+            let pose = this.outline.pose.offset(ahead_m, 0.0);
+            let place = map.nearest(pose.position, pose.heading_rad, 0.0)?;
+            Some((place.lane, (place.station_m, place.station_m + along_m)))
+        };
+        if let Some((lane, moved_m)) = lane_at(front_m) {
+            self.pass_light(&map.lane(lane).stop_lines, moved_m, speed_mps, around);
+        }
+        if let Some((lane, moved_m)) = lane_at(front_m - OVER_LINE_M) {
+            let stops = map.lane(lane).sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
+            self.pass_sign(&mut stops.map(|line| (line.station_m, lane)), moved_m, around);
+        }
+    }
+
+    /// Notes the light whose line lies between two stations.
+    fn pass_light(
+        &mut self,
+        lights: &[StopLine],
+        (from_m, to_m): (f64, f64),
+        speed_mps: f64,
+        around: &Around,
+    ) {
+        if let Some(line) = lights.iter().rfind(|line| (from_m..to_m).contains(&line.station_m)) {
+            self.light =
+                Some(PassedLight { signal: line.signal, shown: shown(line.signal, speed_mps, around) });
+        }
+    }
+
+    /// Notes the stop sign whose line lies between two stations.
+    fn pass_sign(
+        &mut self,
+        stops: &mut impl Iterator<Item = (f64, LaneIndex)>,
+        (from_m, to_m): (f64, f64),
+        around: &Around,
+    ) {
+        if let Some((_, lane)) = stops.find(|(station_m, _)| (from_m..to_m).contains(station_m)) {
+            self.sign = Some(PassedSign { lane, stood: self.stood_at_line(around) });
+        }
     }
 
     /// Whether the light was red, and the body is still in the junction behind it.
@@ -122,11 +153,25 @@ impl Passed {
     }
 
     fn note_standing(&mut self, speed_mps: f64, around: &Around) {
-        if speed_mps <= STOOD_MPS {
-            let goes_on = |stand: &Stand| around.tick - stand.to <= ticks(CREEP_S);
-            let from = self.stand.filter(goes_on).map_or(around.tick, |stand| stand.from);
-            self.stand = Some(Stand { from, to: around.tick });
+        if let Some(stand) = &mut self.stand {
+            stand.gone_m = stand.gone_m.map(|gone_m| gone_m + speed_mps * DT_S);
         }
+        if speed_mps <= STOOD_MPS {
+            let tick = around.tick;
+            let stands_still = |stand: &Stand| stand.gone_m[0] <= AT_LINE_M;
+            self.stand = Some(match self.stand.filter(stands_still) {
+                Some(stand) => Stand { to: tick, gone_m: [stand.gone_m[0], 0.0], ..stand },
+                None => Stand { from: tick, to: tick, gone_m: [0.0; 2] },
+            });
+        }
+    }
+
+    /// Since when the vehicle, whose front passes a stop line now, stood before it, ticks; `None` if it did not.
+    fn stood_at_line(&self, around: &Around) -> Option<u64> {
+        let stand = self.just_stood(around)?;
+        let is_near = |gone_m: f64| gone_m <= AT_LINE_M + OVER_LINE_M;
+        let [from_m, to_m] = stand.gone_m;
+        is_near(from_m).then_some(stand.from).or(is_near(to_m).then_some(stand.to))
     }
 
     /// Whether the vehicle has stood within a few seconds.
@@ -344,20 +389,38 @@ mod tests {
         assert!(!passed.has_just_stood(&world.alone()));
     }
 
-    /// Of two at their signs the one goes first that came to stand first, however long it waits.
+    /// Of two at their signs the one goes first that came to stand at its line first, however long it waits and inches up.
     #[test]
-    fn a_stand_counts_from_its_beginning_and_a_creep_does_not_end_it() {
-        let mut world = World::new(testing::crossing(), &testing::start());
-        let mut passed = Passed::default();
-        let mut since = Vec::new();
-        for tick in 0..200 {
-            // It stands from the start, creeps for 0.4 s, and sets out for 1 s before it stands again.
-            let moves = (60..80).contains(&tick) || (100..150).contains(&tick);
-            passed.note_standing(if moves { 1.0 } else { 0.0 }, &world.alone());
-            since.push(passed.just_stood(&world.alone()).map(|stand| stand.from));
-            world.tick(&crate::sim::tests::hold(&world, 5.0));
-        }
-        assert_eq!([since[0], since[59], since[99], since[149]], [Some(0); 4]);
-        assert_eq!([since[150], since[199]], [Some(150); 2]);
+    fn a_stand_counts_from_its_beginning_at_the_line() {
+        // At so many metres before its line, it stands for 2 s; then it drives on, with another stand of 2 s if that is told.
+        let stood = |stands_m: &[f64]| {
+            let mut world = World::new(testing::crossing(), &testing::start());
+            let mut passed = Passed::default();
+            let mut ahead_m = 20.0;
+            let mut stands = stands_m.iter().copied().peekable();
+            while ahead_m > -OVER_LINE_M {
+                let is_there = stands.next_if(|stand_m| ahead_m <= *stand_m).is_some();
+                for _ in 0..if is_there { 100 } else { 1 } {
+                    passed.note_standing(if is_there { 0.0 } else { 5.0 }, &world.alone());
+                    world.tick(&crate::sim::tests::hold(&world, 5.0));
+                }
+                if !is_there {
+                    ahead_m -= 5.0 * DT_S;
+                }
+            }
+            passed.stood_at_line(&world.alone()).map(|tick| tick as f64 * DT_S)
+        };
+        let near = |found: Option<f64>, wanted_s: f64| found.is_some_and(|s| (s - wanted_s).abs() < 0.1);
+        assert_eq!(stood(&[]), None);
+        assert!(near(stood(&[4.9]), 3.02), "{:?}", stood(&[4.9]));
+        assert_eq!(stood(&[5.2]), None, "it stood in a queue, or for nothing");
+        assert!(near(stood(&[4.5, 0.5]), 3.1), "it inched up: {:?}", stood(&[4.5, 0.5]));
+        assert!(near(stood(&[2.5, -0.3]), 3.5), "over the line by less than half a metre");
+        assert!(near(stood(&[9.0, 1.0]), 5.8), "it moved up in a queue: {:?}", stood(&[9.0, 1.0]));
+        assert!(
+            near(stood(&[5.8, 1.0]), 7.8),
+            "its last stand alone was at the line: {:?}",
+            stood(&[5.8, 1.0])
+        );
     }
 }
