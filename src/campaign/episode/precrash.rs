@@ -436,6 +436,9 @@ impl Before {
         }
         let is_opposite = apart_rad > core::f64::consts::PI - ALIKE_RAD;
         match (is_opposite, self.is_signalized) {
+            // Whichever way it looks, as after a crash or a turn that got stuck.
+            _ if !self.in_junction && self.other.stands() => PreCrash::LeadStopped,
+            (false, true) if self.other.stands() => PreCrash::LeadStopped,
             (true, true) if turns_left => PreCrash::LeftTurnAcrossPathSignalized,
             (true, false) if turns_left => PreCrash::LeftTurnAcrossPath,
             // One that comes over without meaning to change lanes drifts.
@@ -443,8 +446,6 @@ impl Before {
                 PreCrash::ManoeuvreOppositeDirection
             }
             (true, _) => PreCrash::NoManoeuvreOppositeDirection,
-            // Across the lane, as after a crash or a turn that got stuck.
-            _ if !self.in_junction && self.other.stands() => PreCrash::LeadStopped,
             (false, true) if turns_right => PreCrash::RightTurnSignalized,
             (false, false) if turns_left || turns_right => PreCrash::TurningNonSignalized,
             (false, false) => PreCrash::StraightCrossingPaths,
@@ -614,6 +615,12 @@ mod tests {
         assert_eq!(lead(8.0, 0.0), Some(25));
         assert_eq!(lead(3.0, 3.5), Some(24));
         assert_eq!(lead(2.0, 6.0), Some(23));
+        assert_eq!(lead(0.4, 0.05), Some(26));
+        // Whichever way it looks, but where ways cross without lights.
+        let stands = |heading_deg: f64| before([at(54.0, 0.0, heading_deg, 0.0); 2]);
+        assert_eq!([0.0, 90.0, 150.0, 180.0].map(|deg| stands(deg).kind().number()), [Some(26); 4]);
+        let in_junction = |is_signalized: bool| Before { in_junction: true, is_signalized, ..stands(90.0) };
+        assert_eq!([true, false].map(|lights| in_junction(lights).kind().number()), [Some(26), Some(30)]);
         // Hit from behind: the ego vehicle is the one ahead.
         let behind = before([at(-30.0, 0.0, 0.0, 16.0), at(46.0, 0.0, 0.0, 14.0)]);
         assert_eq!(behind.kind(), PreCrash::LeadSlower);
@@ -748,6 +755,7 @@ mod tests {
         let beside = Step { place: at(20.0, -3.0, 0.0, 15.0), off_road_m: 1.0, ..street };
         assert_eq!(along(beside).kind().number(), Some(7));
         assert_ne!(along(Step { in_junction: true, ..beside }).kind().number(), Some(7));
+        assert_ne!(along(Step { place: at(20.0, -3.0, 0.0, 2.0), ..beside }).kind().number(), Some(7));
         let mut changed = along(beside);
         changed.other.steps.insert(1, Step { place: at(10.0, -3.5, 0.0, 15.0), ..street });
         changed.other.steps[0].place.velocity_mps.y = -1.5;

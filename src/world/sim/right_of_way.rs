@@ -94,6 +94,8 @@ const BESIDE_M: f64 = 0.5;
 const CARRIAGEWAY_M: f64 = 21.0;
 /// A vehicle that stood in the ego vehicle's way and has moved by less stands there still, m. Ours.
 const STEP_M: f64 = 2.0;
+/// One that stood beside it and has moved by more stands elsewhere, m. Ours.
+const MOVED_M: f64 = 0.1;
 
 /// Who has priority where two lanes of a junction are in each other's way, with the lights as they are now.
 ///
@@ -144,6 +146,8 @@ pub(super) struct Rights {
     meeting: Option<Meeting>,
     /// Who has priority if it is a wreck in the ego vehicle's way, and since when, s; `None` if it is not.
     wreck: Option<(Priority, f64)>,
+    /// Whether it came into the ego vehicle's way, or the ego vehicle into its, and left room.
+    left_room: bool,
     /// Where it has stood since a moment at which the ego vehicle saw it and could brake gently for it.
     foreseen: Option<Foreseen>,
     /// Where a pedestrian was last looked for on the carriageway, and whether it was there: most stand and wait.
@@ -184,7 +188,7 @@ impl Meeting {
         match self.ruling.rule {
             Rule::Clearing => side.backs(self.ruling.mover),
             // Of one that turns across another's way; they do not follow each other.
-            Rule::Overtaking => false,
+            Rule::Overtaking | Rule::Siren => false,
             _ => side.is_gentle() || side.along > 0.0 && time_s > self.rests_s,
         }
     }
@@ -277,7 +281,7 @@ impl Rights {
             Some(vehicle) => {
                 let by_lane = || {
                     let beyond = || beyond_middle(this, around, Some(point));
-                    Side::of(&vehicle, around)?.at_contact(beyond, around.time_s())
+                    Side::of(&vehicle, true, around)?.at_contact(beyond, around.time_s())
                 };
                 (found.or_else(by_lane), self.foreseen.is_some(), Rule::Standing)
             }
@@ -289,11 +293,16 @@ impl Rights {
         };
         let none = Ruling { time_s: around.time_s(), ..Ruling::default() };
         let ruling = ruling.unwrap_or(none);
-        // Whichever way it stands, who drives comes to it (13.1). Had it come too late, a rule would say so.
+        // Who stands itself stops for nobody any more.
+        if around.ego.speed_mps < STANDING_MPS {
+            return ruling;
+        }
+        // Whichever way it stands, who drives comes to it (13.1).
         let stands = this.body.is_vehicle() && this.velocity_mps.norm() < STANDING_MPS;
-        if ruling.rule == Rule::None && stands && around.ego.speed_mps >= STANDING_MPS {
-            let rule = Rule::Standing;
-            return Ruling { priority: Priority::Other, rule, mover: Mover::Ego, ..ruling };
+        let came_with_room = ruling.rule == Rule::None && self.left_room;
+        if stands && (could_stop || came_with_room) && ruling.priority != Priority::Other {
+            let (rule, time_s) = (Rule::Standing, around.time_s());
+            return Ruling { priority: Priority::Other, rule, mover: Mover::Ego, time_s };
         }
         // A driver must be able to stop for anything that can be foreseen (13.1), so then neither has priority.
         if could_stop && ruling.priority == Priority::Ego {
@@ -305,7 +314,7 @@ impl Rights {
     pub fn trace(&self, trace: &mut Trace) {
         // What was found on the road follows from the pedestrian's position; a rule, its moments and whether a
         // vehicle waits from what was traced before.
-        let Rights { passed, shares, meeting, wreck, foreseen, on_road: _ } = self;
+        let Rights { passed, shares, meeting, wreck, foreseen, left_room, on_road: _ } = self;
         passed.trace(trace);
         trace.flags([
             shares.is_some(),
@@ -313,6 +322,7 @@ impl Rights {
             meeting.is_some(),
             wreck.is_some(),
             foreseen.is_some(),
+            *left_room,
         ]);
         trace.words(wreck.map(|(priority, _)| priority as u64));
         if let Some(Meeting { place, ruling, tick, waits: _, rests_s: _ }) = *meeting {
@@ -331,10 +341,15 @@ impl Rights {
         if this.velocity_mps.norm() >= STANDING_MPS {
             let is_there = |seen: &Foreseen| seen.blocks && (at - seen.at).norm() < STEP_M;
             self.foreseen = self.foreseen.filter(is_there);
-        } else if self.foreseen.is_none()
-            && in_sight
-            && can_stop(allowed_mps(around.ego.speed_mps, around), this.distance_m, ABRUPT_MPS2)
-        {
+            return;
+        }
+        // What moves slowly, such as a door that opens, may stand in the way now and did not before.
+        let has_moved = |seen: &Foreseen| !seen.blocks && (at - seen.at).norm() > MOVED_M;
+        if self.foreseen.is_some_and(|seen| has_moved(&seen)) {
+            self.foreseen = None;
+        }
+        let has_time = || can_stop(allowed_mps(around.ego.speed_mps, around), this.distance_m, ABRUPT_MPS2);
+        if self.foreseen.is_none() && in_sight && has_time() {
             self.foreseen = Some(Foreseen { at, blocks: room_before_m(this, around).is_some() });
         }
     }
@@ -367,7 +382,7 @@ impl Rights {
             self.shares = None;
             return;
         }
-        let side = Side::of(vehicle, around);
+        let side = Side::of(vehicle, false, around);
         let shares = side.as_ref().is_some_and(|side| side.aside_m < 0.0);
         let began = shares && self.shares == Some(false);
         self.shares = Some(shares);
@@ -383,6 +398,7 @@ impl Rights {
             Some(meeting) if meeting.place == Place::Lane => meeting.tick = around.tick,
             Some(_) | None if began => {
                 let ruling = side.at_coming(|| beyond_middle(this, around, None), time_s);
+                self.left_room = ruling.is_none() && side.comes(time_s).is_some();
                 let rests_s = time_s + side.rests_in_s();
                 let found = |ruling| Meeting { rests_s, ..Meeting::in_lane(ruling, around.tick) };
                 self.meeting = ruling.map(found).or(self.meeting);

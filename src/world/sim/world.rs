@@ -39,7 +39,7 @@ use crate::state::trace::Trace;
 
 /// Name of this simulated world. Raised whenever the same seed no longer gives the same episode and trace, so that an
 /// old scenario is told apart from a refuted one.
-pub const ENGINE: &str = "plane/16";
+pub const ENGINE: &str = "plane/17";
 
 /// What stands farther ahead than this on the route does not block the ego vehicle, m: a queue of five cars.
 const QUEUE_M: f64 = 40.0;

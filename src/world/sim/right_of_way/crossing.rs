@@ -199,7 +199,7 @@ impl Crossing {
     /// Whether the one of the two that is in the area stands across the other's strip.
     pub fn is_blocked(&self, first: Mover, vehicle: &Vehicle, around: &Around) -> bool {
         match first {
-            Mover::Ego => Side::of(vehicle, around).is_some_and(|side| side.aside_m < 0.0),
+            Mover::Ego => Side::of(vehicle, false, around).is_some_and(|side| side.aside_m < 0.0),
             Mover::Other | Mover::Both => room_before_m(vehicle.this, around).is_some(),
         }
     }

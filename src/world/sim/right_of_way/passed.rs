@@ -357,6 +357,28 @@ mod tests {
     }
 
     #[test]
+    fn a_front_a_little_over_the_line_of_a_stop_sign_has_not_passed_it() {
+        let scene = testing::crossing_of("206", "274");
+        let map = &scene.map;
+        let line_m = map.lane(map.place("1", -1, 100.0).expect("it is there").lane).sign_lines[0].station_m;
+        // The front goes on by a metre, to so far behind the line.
+        let passes = |over_m: f64| {
+            let mut world = testing::world(&scene);
+            world.put("1", -1, "2", 100.0, 5.0);
+            let half_m = world.latest().obstacle.outline.half_length_m;
+            world.put("1", -1, "2", line_m + over_m - 1.0 - half_m, 5.0);
+            let this = &world.latest().obstacle;
+            let pose = this.outline.pose.offset(1.0, 0.0);
+            let (forward, velocity_mps) = (this.forward, this.velocity_mps);
+            let moved = Moved { pose, forward, lane_heading_rad: pose.heading_rad, velocity_mps };
+            let mut passed = Passed::default();
+            passed.pass_freely(this, &moved, &world.alone());
+            passed.sign.is_some()
+        };
+        assert_eq!([0.4, 0.6, 1.4, 1.6].map(passes), [false, true, true, false]);
+    }
+
+    #[test]
     fn a_stop_sign_is_being_run_from_its_lane_to_the_end_of_the_junction() {
         let map = testing::crossing_of("206", "274").map.clone();
         let lane = map.place("1", -1, 280.0).expect("it is there").lane;

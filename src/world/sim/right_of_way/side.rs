@@ -45,11 +45,13 @@ pub(super) struct Side {
     /// What each does that the other need not expect.
     pub ego_does: Option<Rule>,
     pub other_does: Option<Rule>,
+    /// Whether the other is an emergency vehicle under way.
+    pub has_siren: bool,
 }
 
 impl Side {
-    /// `None` if the ego vehicle is nowhere near the other's way.
-    pub fn of(vehicle: &Vehicle, around: &Around) -> Option<Side> {
+    /// `None` if the ego vehicle is nowhere near the other's way. `touch`: whether they touch.
+    pub fn of(vehicle: &Vehicle, touch: bool, around: &Around) -> Option<Side> {
         let this = vehicle.this;
         let here = this.outline.pose.position;
         let map = &around.scene.map;
@@ -87,6 +89,7 @@ impl Side {
             is_changing_lanes: false,
             own: Own::of_ego(around),
             by_nearest: false,
+            touch,
         }
         .rule(map);
         let other_does = Conduct {
@@ -98,6 +101,7 @@ impl Side {
             own: Own::of_other(vehicle, map),
             // Where the ego vehicle leaves its lane, that decides.
             by_nearest: ego_does.is_none(),
+            touch,
         }
         .rule(map);
         let ego_mps = ego.forward.dot(&around.ego_velocity_mps);
@@ -112,6 +116,7 @@ impl Side {
             other_mps: other.forward.dot(&this.velocity_mps),
             ego_does,
             other_does,
+            has_siren: vehicle.has_siren,
         })
     }
 
@@ -154,13 +159,16 @@ impl Side {
     }
 
     /// Who comes into the lane of the other: the one that has to give way.
-    fn comes(&self, time_s: f64) -> Option<Ruling> {
+    pub fn comes(&self, time_s: f64) -> Option<Ruling> {
         let (priority, rule, mover) = match (self.ego_does, self.other_does) {
             (Some(_), Some(_)) => (Priority::None, Rule::BothLeaveLanes, Mover::Both),
             (Some(rule), None) => (Priority::Other, rule, Mover::Ego),
             (None, Some(rule)) => (Priority::Ego, rule, Mover::Other),
             (None, None) => return None,
         };
+        if self.has_siren && rule.is_beside_into_junction() {
+            return Some(Ruling { priority: Priority::Other, rule: Rule::Siren, mover, time_s });
+        }
         Some(Ruling { priority, rule, mover, time_s })
     }
 
@@ -182,7 +190,7 @@ impl Side {
         };
         match ruling.rule {
             // Whoever came first: one that turns and one that passes it do not drive on behind each other.
-            Rule::Overtaking => Some(ruling),
+            Rule::Overtaking | Rule::Siren => Some(ruling),
             // Who turns off before the other does not drive on ahead of it: it clears the junction.
             Rule::TurningOff if self.can_stop_before() => {
                 Some(Ruling { priority: has_given_way, rule: Rule::Clearing, ..ruling })
@@ -205,7 +213,8 @@ impl Side {
             };
             return Some(beyond_middle().unwrap_or_else(by_lane));
         }
-        let turning = self.comes(time_s).filter(|ruling| ruling.rule.is_beside_into_junction());
+        let is_turning = |rule: Rule| rule.is_beside_into_junction() || rule == Rule::Siren;
+        let turning = self.comes(time_s).filter(|ruling| is_turning(ruling.rule));
         if turning.is_some() {
             return turning;
         }
@@ -261,6 +270,8 @@ struct Conduct<'a> {
     own: Option<Own>,
     /// Whether the nearest lane counts in a junction for what keeps to none. Several may lie there.
     by_nearest: bool,
+    /// Whether it touches the other. One whose side is still within its lane then was touched there.
+    touch: bool,
 }
 
 /// How a vehicle lies in the lane of its way.
@@ -331,7 +342,8 @@ impl Conduct<'_> {
         let over_m = own.offset_m.abs() + half_m - own.width_m / 2.0;
         let aside_mps = own.along.perp(&self.velocity_mps).abs();
         let soon_m = if aside_mps > CROSSING_MPS { aside_mps * SOON_S } else { 0.0 };
-        self.towards_mps > SIDEWAYS_MPS && over_m + soon_m > OVER_M
+        let is_inside = self.touch && over_m < -OVER_M;
+        self.towards_mps > SIDEWAYS_MPS && over_m + soon_m > OVER_M && !is_inside
     }
 }
 

@@ -213,6 +213,7 @@ fn one_who_cuts_in_and_stops_has_not_given_way_before_the_distance_is_back() {
         other_mps,
         ego_does: None,
         other_does: Some(Rule::LeavingLane),
+        has_siren: false,
     };
     let coming = |side: Side| side.at_coming(|| None, 0.0).map(|ruling| ruling.priority);
     // As fast as the ego vehicle, less than a second before it.
@@ -261,6 +262,7 @@ const SIDE: Side = Side {
     other_mps: 10.0,
     ego_does: None,
     other_does: None,
+    has_siren: false,
 };
 
 #[test]
@@ -428,4 +430,37 @@ fn who_stands_beside_the_road_did_not_come_to_an_ego_vehicle_that_leaves_it() {
     assert_eq!(met(2.6, 1.6), came);
     assert_eq!(met(1.5, 1.2), Some((Priority::None, Rule::OnFoot, Mover::Other)), "on the carriageway");
     assert_eq!(met(2.6, 0.4), None);
+}
+
+/// What was found of a car that came out of a drive, when the two touch.
+#[test]
+fn who_drives_stops_for_what_stands_and_who_stands_stops_for_nobody() {
+    let scene = testing::crossing();
+    let told = |ego_mps: f64, other_mps: f64, seen_standing: bool, came: Option<Rule>, left_room: bool| {
+        let mut world = World::new(scene.clone(), &Start { ego_mps, ..testing::start() });
+        world.put("4", -1, "5", 250.0, 0.0);
+        let this = &world.latest().obstacle;
+        let this = Obstacle { velocity_mps: this.forward * other_mps, ..*this };
+        let ruling = |rule: Rule| Ruling { priority: Priority::Ego, rule, mover: Mover::Other, time_s: 0.0 };
+        let rights = Rights {
+            meeting: came.map(|rule| Meeting::in_lane(ruling(rule), 0)),
+            foreseen: seen_standing.then_some(Foreseen { at: this.outline.pose.position, blocks: true }),
+            left_room,
+            ..Rights::default()
+        };
+        let point = this.outline.pose.position;
+        let of = rights.at_contact(&this, &Motion::Stand, point, &world.alone());
+        (of.priority, of.rule, of.mover)
+    };
+    let (stands, entered) = ((Priority::Other, Rule::Standing, Mover::Ego), Some(Rule::Entering));
+    assert_eq!(told(8.0, 0.0, true, entered, false), stands, "it had time to stop");
+    assert_eq!(told(8.0, 0.0, false, entered, false), (Priority::Ego, Rule::Entering, Mover::Other));
+    assert_eq!(
+        told(8.0, 2.0, true, entered, false),
+        (Priority::None, Rule::Standing, Mover::Other),
+        "a step"
+    );
+    assert_eq!(told(8.0, 0.0, false, None, true), stands, "it came with room");
+    assert_eq!(told(8.0, 0.0, false, None, false).1, Rule::None);
+    assert_eq!(told(0.0, 2.0, true, entered, false), (Priority::Ego, Rule::Entering, Mover::Other));
 }
