@@ -27,8 +27,8 @@
 //! red, late yellow or its stop sign has not given way, however early it came. If that was the other vehicle, and the ego vehicle
 //! had time to brake, neither has priority.
 //!
-//! The ego vehicle has no priority over a vehicle that it has seen standing while it could brake gently for it, wherever
-//! that vehicle stands (13.1). If it stood in the ego vehicle's way, moving by a step changes nothing.
+//! A vehicle that stands has priority if the ego vehicle has seen it so while it could brake gently for it, or if it came with room,
+//! wherever it stands and looks (13.1). If it then moves by a step, neither has. An ego vehicle that stands itself stops for nobody.
 //!
 //! A vehicle that has crashed is an obstacle: whoever drives must be able to stop for what can be foreseen (13.1).
 //! It has priority, unless it came to lie in the ego vehicle's way too late to brake gently for it; then neither has.
