@@ -14,8 +14,8 @@
 //! | side by side into a junction | a vehicle does not overtake another where that turns across the road | 11 |
 //! | one lane | a vehicle behind another keeps its distance | 13.5 |
 //!
-//! What a vehicle does decides, and not the word that told it so: a lane change, an offset, and a trajectory that lead
-//! the same way are judged alike. [`Ruling`] says which rule it was, when, and whose motion decided.
+//! A vehicle is judged by its motion, whichever word told it so: a lane change, an offset, and a trajectory that lead
+//! the same way are judged alike. [`Ruling`] names the rule, its moment, and whose motion decided.
 //!
 //! To give way means not to make the other change its speed or direction *abruptly* (article 1), so what counts
 //! is the moment when the first of the two comes into the other's way. A vehicle that then leaves the other
@@ -28,7 +28,7 @@
 //! had time to brake, neither has priority.
 //!
 //! A vehicle that stands has priority if the ego vehicle has seen it so while it could brake gently for it, or if it came with room,
-//! wherever it stands and looks (13.1). If it then moves by a step, neither has. An ego vehicle that stands itself stops for nobody.
+//! wherever it stands and looks (13.1). If it then moves by a step, neither has. An ego vehicle that stands has stopped already.
 //!
 //! A vehicle that has crashed is an obstacle: whoever drives must be able to stop for what can be foreseen (13.1).
 //! It has priority, unless it came to lie in the ego vehicle's way too late to brake gently for it; then neither has.
@@ -37,8 +37,9 @@
 //! pedestrian may not step onto the road without regard to distance and speed of what comes (20.6), and a
 //! driver must not endanger pedestrians and be able to stop for what can be foreseen (21.1, 13.1). So the ego
 //! vehicle has priority only over one that steps onto the carriageway too late for its brakes, and otherwise
-//! neither has. One that stays beside a road which the ego vehicle leaves has priority. It loses that priority once it sees the pedestrian and could still stop, and it
-//! has none at walking pace, from which a driver can stop for any pedestrian.
+//! neither has. It loses that priority once it sees the pedestrian and could still stop, and it
+//! has none at walking pace, from which a driver can stop for any pedestrian. A pedestrian who stays beside the road has priority
+//! over an ego vehicle that leaves the road there.
 //!
 //! If two vehicles come towards each other outside junctions, the one beyond the middle of the road has to give way
 //! (articles 10.3 and 12). Any part of its body counts, such as the rear of a bus that swings over the line. If both are
@@ -168,9 +169,8 @@ struct Meeting {
 }
 
 impl Meeting {
-    /// In a lane, or on foot on the carriageway.
-    fn in_lane(ruling: Ruling, tick: u64) -> Meeting {
-        Meeting { place: Place::Lane, ruling, tick, waits: false, rests_s: f64::INFINITY }
+    fn new(place: Place, ruling: Ruling, tick: u64) -> Meeting {
+        Meeting { place, ruling, tick, waits: false, rests_s: f64::INFINITY }
     }
 
     /// Whether the two were in each other's way a short time ago.
@@ -293,7 +293,7 @@ impl Rights {
         };
         let none = Ruling { time_s: around.time_s(), ..Ruling::default() };
         let ruling = ruling.unwrap_or(none);
-        // Who stands itself stops for nobody any more.
+        // An ego vehicle that stands has stopped already.
         if around.ego.speed_mps < STANDING_MPS {
             return ruling;
         }
@@ -358,12 +358,9 @@ impl Rights {
         let this = vehicle.this;
         if let Some(found) = Crossing::of(vehicle, around) {
             let place = Place::Area(found.ego.lane, found.other.lane);
-            let judged = || Meeting {
-                place,
-                ruling: found.ruling([ego_passed, &self.passed], vehicle.has_siren, around),
-                tick: around.tick,
-                waits: false,
-                rests_s: f64::INFINITY,
+            let judged = || {
+                let ruling = found.ruling([ego_passed, &self.passed], vehicle.has_siren, around);
+                Meeting::new(place, ruling, around.tick)
             };
             let known = self.meeting.filter(|meeting| meeting.place == place);
             let mut meeting = known.unwrap_or_else(judged);
@@ -400,7 +397,7 @@ impl Rights {
                 let ruling = side.at_coming(|| beyond_middle(this, around, None), time_s);
                 self.left_room = ruling.is_none() && side.comes(time_s).is_some();
                 let rests_s = time_s + side.rests_in_s();
-                let found = |ruling| Meeting { rests_s, ..Meeting::in_lane(ruling, around.tick) };
+                let found = |ruling| Meeting { rests_s, ..Meeting::new(Place::Lane, ruling, around.tick) };
                 self.meeting = ruling.map(found).or(self.meeting);
             }
             Some(_) | None => {}
@@ -441,7 +438,7 @@ impl Rights {
                 Some(known) => known,
                 None => on_foot(this, &strip, around),
             };
-            self.meeting = Some(Meeting::in_lane(ruling, around.tick));
+            self.meeting = Some(Meeting::new(Place::Lane, ruling, around.tick));
         }
         self.shares = Some(shares);
     }

@@ -21,7 +21,7 @@ const STOOD_S: f64 = 5.0;
 /// To have stood at a line means no farther before it than this, m: no car fits in between. One that moves on by less stands there still.
 /// Ours.
 const AT_LINE_M: f64 = 5.0;
-/// A front that reaches over a stop line by less has not passed it, m. Ours: drivers see no line that is under them.
+/// A front that reaches over the line of a stop sign by less has not passed it, m. Ours: a driver does not see a line under the bonnet.
 const OVER_LINE_M: f64 = 0.5;
 /// Of two that stood at their signs, one was first if it stood earlier by more than this, s. Ours.
 const FIRST_S: f64 = 1.0;
@@ -69,18 +69,18 @@ pub(in crate::sim) struct Passed {
 
 impl Passed {
     /// Notes the lines that lie between two stations of a front: lights, and stop signs with the lanes that they stand on,
-    /// a little later. `speed_mps`: of the vehicle.
+    /// these once the front is [`OVER_LINE_M`] beyond. `speed_mps`: of the vehicle.
     pub fn pass(
         &mut self,
         lights: &[StopLine],
-        mut stops: impl Iterator<Item = (f64, LaneIndex)>,
+        stops: impl Iterator<Item = (f64, LaneIndex)>,
         (from_m, to_m): (f64, f64),
         speed_mps: f64,
         around: &Around,
     ) {
         self.note_standing(speed_mps, around);
         self.pass_light(lights, (from_m, to_m), speed_mps, around);
-        self.pass_sign(&mut stops, (from_m - OVER_LINE_M, to_m - OVER_LINE_M), around);
+        self.pass_sign(stops, (from_m - OVER_LINE_M, to_m - OVER_LINE_M), around);
     }
 
     /// As [`Passed::pass`], of a vehicle that keeps to no lanes: the lines are those of the lane under its front.
@@ -103,7 +103,7 @@ impl Passed {
         }
         if let Some((lane, moved_m)) = lane_at(front_m - OVER_LINE_M) {
             let stops = map.lane(lane).sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
-            self.pass_sign(&mut stops.map(|line| (line.station_m, lane)), moved_m, around);
+            self.pass_sign(stops.map(|line| (line.station_m, lane)), moved_m, around);
         }
     }
 
@@ -124,7 +124,7 @@ impl Passed {
     /// Notes the stop sign whose line lies between two stations.
     fn pass_sign(
         &mut self,
-        stops: &mut impl Iterator<Item = (f64, LaneIndex)>,
+        mut stops: impl Iterator<Item = (f64, LaneIndex)>,
         (from_m, to_m): (f64, f64),
         around: &Around,
     ) {

@@ -225,7 +225,7 @@ fn one_who_cuts_in_and_stops_has_not_given_way_before_the_distance_is_back() {
     // Who is still as near once it could have stopped follows the other: 0.4 s, and 10 m/s at 3 m/s².
     let ruling = side(4.0, 10.0).at_coming(|| None, 0.0).expect("it cut in");
     let rests_s = side(4.0, 10.0).rests_in_s();
-    let meeting = Meeting { rests_s, ..Meeting::in_lane(ruling, 0) };
+    let meeting = Meeting { rests_s, ..Meeting::new(Place::Lane, ruling, 0) };
     assert_eq!([3.7, 3.8].map(|time_s| meeting.is_over(&side(4.0, 10.0), time_s)), [false, true]);
     assert!(!meeting.is_over(&Side { along: -1.0, ..side(4.0, 10.0) }, 9.0), "they come towards each other");
 }
@@ -434,7 +434,7 @@ fn who_stands_beside_the_road_did_not_come_to_an_ego_vehicle_that_leaves_it() {
 
 /// What was found of a car that came out of a drive, when the two touch.
 #[test]
-fn who_drives_stops_for_what_stands_and_who_stands_stops_for_nobody() {
+fn an_ego_vehicle_that_drives_gives_way_to_what_stands_and_one_that_stands_does_not() {
     let scene = testing::crossing();
     let told = |ego_mps: f64, other_mps: f64, seen_standing: bool, came: Option<Rule>, left_room: bool| {
         let mut world = World::new(scene.clone(), &Start { ego_mps, ..testing::start() });
@@ -443,7 +443,7 @@ fn who_drives_stops_for_what_stands_and_who_stands_stops_for_nobody() {
         let this = Obstacle { velocity_mps: this.forward * other_mps, ..*this };
         let ruling = |rule: Rule| Ruling { priority: Priority::Ego, rule, mover: Mover::Other, time_s: 0.0 };
         let rights = Rights {
-            meeting: came.map(|rule| Meeting::in_lane(ruling(rule), 0)),
+            meeting: came.map(|rule| Meeting::new(Place::Lane, ruling(rule), 0)),
             foreseen: seen_standing.then_some(Foreseen { at: this.outline.pose.position, blocks: true }),
             left_room,
             ..Rights::default()
