@@ -4,7 +4,7 @@
 set -eu
 
 root=$(cd "$(dirname "$0")/../.." && pwd)
-found=boulevard_0383
+found=boulevard_0300
 binary=${AVASTRA:-$root/target/release/avastra}
 [ -n "${AVASTRA:-}" ] || (cd "$root" && cargo build --release --quiet)
 work=$(mktemp -d)

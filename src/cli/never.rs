@@ -1,5 +1,5 @@
-//! What never happened in a run: rows of the table that were never legal, never chosen or never carried out, with
-//! what stood in their way.
+//! What never happened in a run: rows of the table for which the agent never asked, or that were never legal, never chosen or never
+//! carried out, with what stood in their way.
 
 use std::collections::BTreeMap;
 
@@ -18,8 +18,9 @@ const ROWS_MAX: usize = 6;
 pub struct Never {
     /// Rows of the table.
     rows: usize,
-    /// Steps of all episodes; in each of them every row is offered.
+    /// Steps of all episodes.
     steps: i64,
+    asked: Vec<RowFate>,
     legal: Vec<RowFate>,
     chosen: Vec<RowFate>,
     realised: Vec<RowFate>,
@@ -34,13 +35,12 @@ struct RowFate {
 }
 
 impl Never {
-    /// From what became of each row of the table.
-    pub fn new(table: &ActionTable, counts: &BTreeMap<i64, RowCount>) -> Never {
-        let steps =
-            |count: &RowCount| count.legal + count.refused.iter().map(|refusal| refusal.times).sum::<i64>();
+    /// From what became of each row of the table, in so many steps.
+    pub fn new(table: &ActionTable, counts: &BTreeMap<i64, RowCount>, steps: i64) -> Never {
         let mut never = Never {
             rows: table.rows().len(),
-            steps: counts.values().map(steps).max().unwrap_or(0),
+            steps,
+            asked: Vec::new(),
             legal: Vec::new(),
             chosen: Vec::new(),
             realised: Vec::new(),
@@ -51,6 +51,7 @@ impl Never {
         for row in table.rows() {
             let count = counts.get(&(row.index as i64)).cloned().unwrap_or_default();
             let list = match &count {
+                RowCount { chosen: 0, legal: 0, refused, .. } if refused.is_empty() => &mut never.asked,
                 RowCount { chosen: 0, legal: 0, .. } => &mut never.legal,
                 RowCount { chosen: 0, .. } => &mut never.chosen,
                 RowCount { realised: 0, .. } => &mut never.realised,
@@ -64,9 +65,10 @@ impl Never {
     /// Counts and the reasons of most rows; with `all`, every row with every reason.
     pub fn in_words(&self, all: bool) -> String {
         if self.steps == 0 {
-            return "no row was offered".to_owned();
+            return "no step was played".to_owned();
         }
-        let never: usize = [&self.legal, &self.chosen, &self.realised].iter().map(|rows| rows.len()).sum();
+        let never: usize =
+            [&self.asked, &self.legal, &self.chosen, &self.realised].iter().map(|rows| rows.len()).sum();
         if never == 0 {
             return format!("each of the {} was carried out", plural(self.rows, "row"));
         }
@@ -76,6 +78,7 @@ impl Never {
             plural(self.steps as usize, "step")
         )];
         let lists = [
+            (&self.asked, "never asked for", "the agent chose others".to_owned()),
             (&self.legal, "never legal", self.reasons(&self.legal)),
             (&self.chosen, "legal, but never chosen", "the agent chose others".to_owned()),
             (&self.realised, "chosen, but never carried out", self.reasons(&self.realised)),
@@ -87,7 +90,7 @@ impl Never {
             lines.push(format!("  {} {what}", rows.len()));
             match all {
                 true => lines.extend(rows.iter().flat_map(RowFate::lines)),
-                false if what.starts_with("legal") => {
+                false if rows.iter().all(|row| row.count.refused.is_empty()) || what.starts_with("legal") => {
                     lines.extend(indented(4, &format!("{} ({reasons})", named(rows.iter()))));
                 }
                 false => lines.push(reasons),
@@ -117,11 +120,11 @@ impl Never {
         let left = reasons.len().saturating_sub(REASONS_MAX);
         let mut lines = Vec::new();
         for (reason, (times, members)) in reasons.into_iter().take(REASONS_MAX) {
-            let steps = match members.as_slice() {
-                [_] => format!("in {times} of {} steps", self.steps),
-                _ => format!("in up to {times} of {} steps", self.steps),
+            let times = match members.as_slice() {
+                [only] => format!("{times} of {}", plural(only.asked() as usize, "time")),
+                _ => format!("up to {}", plural(times as usize, "time")),
             };
-            lines.extend(indented(4, &format!("{}: {reason} ({steps})", named(members.into_iter()))));
+            lines.extend(indented(4, &format!("{}: {reason} ({times})", named(members.into_iter()))));
         }
         if left > 0 {
             lines.push(format!("    and {} others", plural(left, "reason")));
@@ -131,6 +134,11 @@ impl Never {
 }
 
 impl RowFate {
+    /// Steps in which the agent asked for it.
+    fn asked(&self) -> i64 {
+        self.count.legal + self.count.refused.iter().map(|refusal| refusal.times).sum::<i64>()
+    }
+
     /// The row with all that refused it.
     fn lines(&self) -> Vec<String> {
         let mut lines = indented(4, &format!("row {}, {}", self.row, self.label));

@@ -188,7 +188,8 @@ fn play_all(
     if let [table, cases] = tables.as_slice() {
         output.say(&format!("each row: {}, {}", table.shown(), cases.shown()));
     }
-    let never = Never::new(run.table(), &directory.read(Database::rows)?);
+    let counts = directory.read(Database::rows)?;
+    let never = Never::new(run.table(), &counts, directory.read(Database::steps)?);
     // A protocol says of each row what came of it.
     if !is_protocol {
         output.say(&never.in_words(output.verbose));

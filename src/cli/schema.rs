@@ -119,8 +119,9 @@ run
   refusals[] object a reason why actions were refused: `reason` and `times`
   groups[] object a distinct failure: its type among NHTSA's pre-crash types (`precrash`, `precrash_number`), the modules at fault, `count`, how many were played again (`tried`) and recur (`recurring`), an episode that shows it with its own `recurrence`, what happened there
   never.rows number rows of the table
-  never.steps number steps of all episodes, in each of which every row is offered
-  never.legal[] object a row that no step allowed; what `refused` it, and how often
+  never.steps number steps of all episodes
+  never.asked[] object a row for which the agent never asked
+  never.legal[] object a row that was never legal when the agent asked for it; what `refused` it, and how often
   never.chosen[] object a row that was legal, but that the agent never chose
   never.realised[] object a row that was chosen, but never carried out
   requirements[] object a requirement in force: for how long it was asked (`asked_s`, `asked_in` episodes), `breaches`, `breached_in`, `tried_in` and `kept_in` (episodes with a breach; of these, those that careful drivers drove, and that one kept), the `smallest` margin in its `unit`, the `nearest` episode, a `scenario` with the worst breach of those that were written

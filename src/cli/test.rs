@@ -477,7 +477,11 @@ impl Suite<'_> {
             Some(_) => {
                 let setup = stage.setup(&recorded);
                 let all = own.iter().map(|index| oracle::regression(&setup, &log, *index, &ads));
-                all.max_by_key(|found| found.rank()).expect("there is one at least")
+                // Of several that are as bad, the first.
+                let worse = |worst: Regression, next: Regression| {
+                    if next.rank() > worst.rank() { next } else { worst }
+                };
+                all.reduce(worse).expect("there is one at least")
             }
             // Already with the driving system that it was found with.
             None => Regression::OtherCrash,

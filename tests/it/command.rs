@@ -272,7 +272,7 @@ fn an_interrupted_run_goes_on_where_it_was() {
     let whole = run("whole");
     run("cut");
     // The directory is left as by a run that was killed half-way.
-    let cut = "DELETE FROM step WHERE episode >= 5; DELETE FROM collision WHERE episode >= 5;
+    let cut = "DELETE FROM step WHERE episode >= 5; DELETE FROM collision WHERE episode >= 5; DELETE FROM scenario WHERE episode >= 5;
                DELETE FROM offer WHERE episode >= 5; DELETE FROM held WHERE episode >= 5;
                DELETE FROM episode WHERE episode >= 5;
                DELETE FROM seal WHERE unit >= 5;";
@@ -316,7 +316,7 @@ fn a_run_says_what_never_happened() {
     let long = run(&["--verbose"]);
     assert!(long.contains("    row 2, racer()\n") && long.contains(" × in_haste: "), "{long}");
     let idle = run(&["--agent", "none"]);
-    assert!(idle.contains("2 legal, but never chosen\n    rows 0, 1 (the agent chose others)"), "{idle}");
+    assert!(idle.contains("3 never asked for\n    rows 0, 1, 2 (the agent chose others)"), "{idle}");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! What the clock, the sky, the odds and the lanes do: wishes whose effect is seen in the world.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use avastra::action::{ActionTable, RowOdds, Situation};
@@ -13,7 +14,7 @@ use crate::wishes::{row, wish};
 use crate::world::{Wide, assert_replays, run_of, space_at};
 
 /// The odds of all rows in a state, on the first road.
-fn shares(odds: Vec<RowOdds>) -> Vec<u32> {
+fn shares(odds: Vec<RowOdds>) -> Vec<f64> {
     let share = |odds: RowOdds| match odds {
         RowOdds::Share(share) => share,
         RowOdds::Chance { .. } => panic!("a rate"),
@@ -21,7 +22,7 @@ fn shares(odds: Vec<RowOdds>) -> Vec<u32> {
     odds.into_iter().map(share).collect()
 }
 
-fn odds_of(table: &ActionTable, memory: &Memory) -> Vec<u32> {
+fn odds_of(table: &ActionTable, memory: &Memory) -> Vec<f64> {
     let rules = RulesInForce::new(table.space(), &[], &[]).expect("no rule is named");
     let surroundings = &Wide { safety_gap_m: 0.0 };
     let road = &table.space().roads[0];
@@ -38,12 +39,25 @@ fn in_most_steps_nothing_happens() {
         let of_action = rows.filter(|(row, _)| row.label.split('(').next() == Some(action));
         of_action.map(|(_, odds)| odds).collect::<Vec<_>>()
     };
-    assert_eq!(odds("nothing"), [1000]);
-    assert_eq!(odds("pedestrian"), [5; 2]);
-    assert_eq!(odds("cross_road"), [20; 8]);
-    assert_eq!(odds("fog"), [1; 3], "what is not named is `_`");
+    assert_eq!(odds("nothing"), [1000.0]);
+    assert_eq!(odds("pedestrian"), [5.0; 2]);
+    assert_eq!(odds("cross_road"), [20.0; 8]);
+    assert_eq!(odds("fog"), [1.0; 3], "what is not named is `_`");
+}
+
+#[test]
+fn without_odds_each_action_is_as_likely_and_weather_and_time_come_seldom() {
     let table = ActionTable::new(space_at("scenarios/avastra45.ava"));
-    assert_eq!(odds_of(&table, &table.space().initial_memory(1)), [1; 45]);
+    let mut of_actions: BTreeMap<&str, f64> = BTreeMap::new();
+    for (row, odds) in table.rows().iter().zip(odds_of(&table, &table.space().initial_memory(1))) {
+        let name = &table.space().actions[row.action].name;
+        *of_actions.entry(name.as_str()).or_default() += odds;
+    }
+    let settings = ["clear_sky", "rain", "fog", "wet", "set_time"];
+    let setting: f64 = settings.iter().map(|name| of_actions.remove(name).expect("it is there")).sum();
+    assert!((setting - 0.15).abs() < 1e-12, "{setting}");
+    let each = 0.85 / of_actions.len() as f64;
+    assert!(of_actions.values().all(|odds| (odds - each).abs() < 1e-12), "{of_actions:?}");
 }
 
 #[test]
@@ -67,7 +81,7 @@ fn more_cars_come_in_the_rush_hour() {
             assert!(!is_rush || (60.0..=126.0).contains(&elapsed_s), "{elapsed_s} s");
             assert!(is_rush || !(66.1..=120.0).contains(&elapsed_s), "{elapsed_s} s");
             let odds = shares(table.odds(moment.situation));
-            assert_eq!(odds, if is_rush { [100, 20, 5] } else { [100, 2, 1] });
+            assert_eq!(odds, if is_rush { [100.0, 20.0, 5.0] } else { [100.0, 2.0, 1.0] });
             if table.offer(moment.situation, car).is_ok() {
                 steps[usize::from(is_rush)] += 1;
                 let is_car = matches!(&choice, Choice::Act(draw) if draw.row == car);

@@ -22,6 +22,8 @@ struct Planted {
     space: &'static str,
     /// The search for a crash begins at this episode.
     begin: usize,
+    /// Of the run. In `step_out` few episodes need the second hypothesis.
+    seed: u64,
 }
 
 /// Random search finds most of them in the shipped space. The others need a narrow road, a leader that brakes,
@@ -44,8 +46,8 @@ const PLANTED: [Planted; 17] = [
     planted("perception_half_range", "tests/cases/faults/leader.ava", 0),
     planted("planning_never_yields", SHIPPED, 50),
     planted("planning_tailgates", "tests/cases/faults/leader.ava", 0),
-    planted("prediction_frozen", SHIPPED, 50),
-    planted("prediction_one_hypothesis", "tests/cases/faults/step_out.ava", 0),
+    planted("prediction_frozen", SHIPPED, 0),
+    Planted { seed: 5, ..planted("prediction_one_hypothesis", "tests/cases/faults/step_out.ava", 0) },
     planted("tracking_late", "tests/cases/faults/step_out.ava", 0),
     planted("tracking_merges", SHIPPED, 0),
     planted("tracking_no_velocity", SHIPPED, 50),
@@ -53,7 +55,7 @@ const PLANTED: [Planted; 17] = [
 const SHIPPED: &str = "scenarios/avastra45.ava";
 
 const fn planted(name: &'static str, space: &'static str, begin: usize) -> Planted {
-    Planted { name, space, begin }
+    Planted { name, space, begin, seed: 3 }
 }
 
 /// Number of small variations of a crash. At least half of them must crash too: a fault's crash is no accident.
@@ -69,9 +71,9 @@ const CRASHES: usize = 3;
 fn the_module_at_fault_is_named() {
     let decoys = profile(DECOYS);
     let mut wrong = Vec::new();
-    for Planted { name, space, begin } in PLANTED {
+    for Planted { name, space, begin, seed } in PLANTED {
         let module = module_of(name);
-        let usual = run_of(made(space), EPISODES, 3, &[]);
+        let usual = run_of(made(space), EPISODES, seed, &[]);
         let planted = decoys.with_module_of(module, &fault(name));
         let settings = RunSettings { profile: Some(Profile::new(&planted)), ..usual.settings().clone() };
         let run = Run::new(usual.table().clone(), settings).expect("the settings name what exists");

@@ -74,7 +74,7 @@ fn every_command_of_the_tour_does_what_the_page_says() {
     }
     assert!(wrong.is_empty(), "{wrong}");
     assert!(commands >= 12, "{commands} commands");
-    for written in ["found/report.html", "crash.svg", "junit.xml", "suite/corner_0007.ava"] {
+    for written in ["found/report.html", "crash.svg", "junit.xml", "suite/corner_0011.ava"] {
         assert!(scratch.path().join(written).is_file(), "{written}");
     }
 }

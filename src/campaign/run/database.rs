@@ -241,7 +241,16 @@ impl Database {
         Ok(refusals)
     }
 
-    /// What became of each row of the table, by its number, over all episodes. A row that was never offered is
+    /// Steps of all episodes.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn steps(&self) -> Result<i64, DatabaseError> {
+        let steps: Vec<i64> = query_all(&self.connection, "SELECT count(*) FROM step", |row| row.get(0))?;
+        Ok(steps.into_iter().sum())
+    }
+
+    /// What became of each row of the table, by its number, over all episodes. A row for which no agent asked is
     /// absent.
     ///
     /// # Errors

@@ -1,5 +1,5 @@
-//! What became of each row: in how many steps it was legal, and what stood in its way in the others.
-//! An episode notes every offer of every step ([`Offered`]), `run.db` adds the episodes up, and [`RowCount`] is the sum
+//! What became of each row: in how many steps it was legal when the agent asked for it, and what stood in its way in the others.
+//! An episode notes the offers of every step ([`Offered`]), `run.db` adds the episodes up, and [`RowCount`] is the sum
 //! for one row. From these a run says at its end which rows never happened.
 
 use std::borrow::Cow;
@@ -56,13 +56,13 @@ impl Offered {
 /// What became of a row in all episodes of a run.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct RowCount {
-    /// Steps in which it was legal.
+    /// Steps in which the agent asked for it, and it was legal.
     pub legal: i64,
     /// Steps in which the agent chose it.
     pub chosen: i64,
     /// Steps in which it was carried out.
     pub realised: i64,
-    /// What stood in its way in the other steps, the most frequent first.
+    /// What stood in its way in the other steps in which the agent asked for it, the most frequent first.
     pub refused: Vec<RefusalCount>,
 }
 

@@ -131,10 +131,6 @@ impl Run {
         let mut choose = |moment: &Moment| {
             let mut offers = Offers::of(agent, moment);
             let row = offers.chosen_by(agent);
-            if own.is_none() {
-                // A run tells which rows never happened, and why, whatever its agent asks for.
-                offers.legal();
-            }
             offered.note(offers.judged(), own);
             offers.choice(row)
         };

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::check::checker::{Checker, each, literal};
-use crate::check::declaration::{even_odds, unknown_word};
+use crate::check::declaration::unknown_word;
 use crate::check::expression::{NUMBER_MAX, Place, is_beyond_states, is_number};
 use crate::check::names::docs;
 use crate::check::operator::with_range;
@@ -139,8 +139,7 @@ impl Checker {
             docs: docs(item),
             parameters,
             effects: effects.into_iter().flatten().flatten().collect(),
-            // Until `odds actions` says otherwise.
-            odds: even_odds(),
+            odds: None,
             span: declared.name.span,
         };
         Some((action, is_whole))

@@ -43,7 +43,7 @@ struct Cost {
 const ODDS_MAX: u32 = 100;
 
 /// The odds of what `odds` does not name.
-pub(super) fn even_odds() -> Expr {
+fn even_odds() -> Expr {
     Expr { kind: ExprKind::Number(Rational::ONE), ty: Type::Int, span: Span::NONE }
 }
 
@@ -96,7 +96,7 @@ impl Checker {
         let Some((_, declared)) = of_actions else { return };
         for (action, odds) in self.action_odds(declared).into_iter().enumerate() {
             let known = self.actions[action].as_mut().map(Arc::make_mut);
-            known.into_iter().for_each(|known| known.odds = odds.clone());
+            known.into_iter().for_each(|known| known.odds = Some(odds.clone()));
         }
     }
 

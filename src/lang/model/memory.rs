@@ -174,7 +174,7 @@ impl Space {
         };
         self.rules.iter().any(rule_asks)
             || self.each_step.iter().flat_map(SetDef::parts).any(asks)
-            || self.actions.iter().any(|action| asks(&action.odds))
+            || self.actions.iter().any(|action| action.odds.as_ref().is_some_and(asks))
     }
 
     /// The named road users about which what every step does asks.

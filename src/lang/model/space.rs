@@ -175,8 +175,8 @@ pub struct ActionDef {
     /// Its own, then those that `on … also` adds.
     pub effects: Vec<EffectDef>,
     /// How often each of its rows is drawn by chance, relative to other rows: a whole number from 0 to
-    /// [`ACTION_ODDS_MAX`], in states and at moments.
-    pub odds: Expr,
+    /// [`ACTION_ODDS_MAX`], in states and at moments. `None` if the space has no `odds actions`.
+    pub odds: Option<Expr>,
     pub span: Span,
 }
 

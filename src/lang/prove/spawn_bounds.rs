@@ -7,8 +7,8 @@ use crate::model::OFFSET_M;
 use crate::model::expr::ExprKind;
 use crate::model::vocabulary::{CommandField, Word};
 use crate::model::{
-    ACTION_ODDS_MAX, ActionDef, EARLY_S, Interval, LIGHT_AT_M, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS,
-    Space, Type, WAITS_S, WordExpr, code, effort, spawn_distance_m,
+    ACTION_ODDS_MAX, EARLY_S, Interval, LIGHT_AT_M, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, Type,
+    WAITS_S, WordExpr, code, effort, spawn_distance_m,
 };
 use crate::prove::enclose::{Known, enclose};
 use crate::prove::reach::spawn_figures;
@@ -36,7 +36,7 @@ fn of_odds(space: &Space) -> Vec<Diagnostic> {
     let known = Known { functions: &space.functions, locals: &[], cells: &cells, road: None, case: None };
     let mut found: Vec<Diagnostic> = Vec::new();
     let mut seen = BTreeSet::new();
-    for ActionDef { odds, .. } in &space.actions {
+    for odds in space.actions.iter().filter_map(|action| action.odds.as_ref()) {
         let may_be = enclose(odds, &known).interval();
         let is_rate = odds.ty == Type::Quantity(Dimension::RATE);
         let range = 0.0..=if is_rate { 1.0 / step_s } else { f64::from(ACTION_ODDS_MAX) };

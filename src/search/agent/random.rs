@@ -11,29 +11,35 @@ use avastra_world::action::RowOdds;
 
 use super::acting::{Agent, Mask};
 
+/// So many rows are asked for one after another before all are. Ours: with half of the rows legal, all are in one of 65,000 steps.
+const TRIES: usize = 16;
+
 /// Draws among the legal rows by their odds, each as likely until it is told others. Actions with a rate come first: each in
 /// its part of the steps, shared by its legal rows; the rows with shares have what is left of a step.
+///
+/// It draws a row and asks whether that one is legal; if not, it draws again. That is the distribution of a draw among the legal rows.
 #[derive(Default)]
 pub struct MaskedRandom {
     odds: Vec<RowOdds>,
 }
 
 impl MaskedRandom {
-    /// The shares of the legal rows, 0 for others.
-    fn legal_shares<'a>(&'a self, legal: ArrayView1<'a, bool>) -> impl Iterator<Item = u32> + 'a {
-        (0..legal.len()).map(move |row| match self.odds.get(row) {
-            _ if !legal[row] => 0,
-            None => 1,
+    /// The share of a row among those that have shares.
+    fn share(&self, row: usize) -> f64 {
+        match self.odds.get(row) {
+            None => 1.0,
             Some(RowOdds::Share(share)) => *share,
-            Some(RowOdds::Chance { .. }) => 0,
-        })
+            Some(RowOdds::Chance { .. }) => 0.0,
+        }
     }
 
     /// The chances of the legal rows whose actions have rates, 0 for others. None, if no action has one.
-    fn legal_rates(&self, legal: ArrayView1<bool>) -> Option<Vec<f64>> {
+    fn legal_rates(&self, mut is_legal: impl FnMut(usize) -> bool) -> Option<Vec<f64>> {
+        let mut legal = vec![false; self.odds.len()];
         let mut rows: BTreeMap<usize, u32> = BTreeMap::new();
         for (row, odds) in self.odds.iter().enumerate() {
             if let RowOdds::Chance { action, .. } = odds {
+                legal[row] = is_legal(row);
                 *rows.entry(*action).or_default() += u32::from(legal[row]);
             }
         }
@@ -60,14 +66,8 @@ impl Agent for MaskedRandom {
     }
 
     fn choose(&mut self, _: &Observation, legal: &mut dyn Mask, rng: &mut Rng) -> Option<usize> {
-        let legal = legal.all()?;
-        let legal = legal.view();
-        if let Some(rates) = self.legal_rates(legal) {
-            let mut ticket = rng::unit(rng);
-            let by_rate = rates.iter().position(|chance| {
-                ticket -= chance;
-                ticket < 0.0
-            });
+        if let Some(rates) = self.legal_rates(|row| legal.is_legal(row)) {
+            let by_rate = weighted(&rates, rng::unit(rng));
             if by_rate.is_some() {
                 return by_rate;
             }
@@ -76,27 +76,45 @@ impl Agent for MaskedRandom {
                 return rates.iter().rposition(|chance| *chance > 0.0);
             }
         }
-        let sum: u32 = self.legal_shares(legal).sum();
-        if sum == 0 {
-            return None;
-        }
-        let mut ticket = rng::below(rng, sum);
-        self.legal_shares(legal).position(|share| match ticket.checked_sub(share) {
-            Some(left) => {
-                ticket = left;
-                false
+        let mut shares: Vec<f64> = (0..legal.rows()).map(|row| self.share(row)).collect();
+        for _ in 0..TRIES {
+            let row = by_shares(&shares, rng)?;
+            if legal.is_legal(row) {
+                return Some(row);
             }
-            None => true,
-        })
+        }
+        let legal = legal.all()?;
+        shares.iter_mut().zip(&legal).filter(|(_, legal)| !**legal).for_each(|(share, _)| *share = 0.0);
+        by_shares(&shares, rng)
     }
 
     fn chances(&self, legal: ArrayView1<bool>) -> Option<Array1<f64>> {
-        let rates = self.legal_rates(legal).unwrap_or_else(|| vec![0.0; legal.len()]);
+        let rates = self.legal_rates(|row| legal[row]).unwrap_or_else(|| vec![0.0; legal.len()]);
         let left = (1.0 - rates.iter().sum::<f64>()).max(0.0);
-        let sum = f64::from(self.legal_shares(legal).sum::<u32>().max(1));
-        let shares = self.legal_shares(legal).map(|share| left * f64::from(share) / sum);
-        Some(shares.zip(rates).map(|(share, rate)| share + rate).collect())
+        let share = |row: usize| if legal[row] { self.share(row) } else { 0.0 };
+        let sum: f64 = (0..legal.len()).map(share).sum();
+        let part = |(row, rate): (usize, f64)| match sum > 0.0 {
+            true => rate + left * share(row) / sum,
+            false => rate,
+        };
+        Some(rates.into_iter().enumerate().map(part).collect())
     }
+}
+
+/// A row by shares that need not add up to 1; `None` if all are 0.
+fn by_shares(shares: &[f64], rng: &mut Rng) -> Option<usize> {
+    let sum: f64 = shares.iter().sum();
+    let last = shares.iter().rposition(|share| *share > 0.0)?;
+    // The sum was rounded.
+    Some(weighted(shares, rng::unit(rng) * sum).unwrap_or(last))
+}
+
+/// The row in whose part of the sum of the weights a ticket falls; `None` beyond the last.
+fn weighted(weights: &[f64], mut ticket: f64) -> Option<usize> {
+    weights.iter().position(|weight| {
+        ticket -= weight;
+        ticket < 0.0
+    })
 }
 
 /// Uniform over all rows, legal or not.
@@ -128,7 +146,7 @@ mod tests {
     fn rows_come_by_their_odds() {
         let mut rng = stream(3, Stream::Exploration, 0);
         let mut agent = MaskedRandom::default();
-        agent.weigh(&|| [1, 7, 0, 3].map(RowOdds::Share).to_vec());
+        agent.weigh(&|| [1.0, 7.0, 0.0, 3.0].map(RowOdds::Share).to_vec());
         let legal = Array1::from_vec(vec![true, false, true, true]);
         let chances = agent.chances(legal.view()).unwrap();
         assert_eq!(chances.to_vec(), [0.25, 0.0, 0.0, 0.75]);
@@ -138,16 +156,51 @@ mod tests {
             seen[row] += 1.0 / 4000.0;
         }
         assert!(seen.iter().zip(&chances).all(|(seen, chance)| (seen - chance).abs() < 0.03), "{seen:?}");
-        // Without odds each open row is as likely, and is drawn as by `any`.
-        let mut equal = MaskedRandom::default();
-        let [mut one, mut other] = [stream(5, Stream::Exploration, 1), stream(5, Stream::Exploration, 1)];
-        for _ in 0..100 {
-            let row = equal.choose(&Observation::zeros(), &mut legal.to_vec(), &mut one);
-            assert_eq!(row, any(legal.iter(), &mut other));
-        }
+        // Without odds each open row is as likely.
+        let equal = MaskedRandom::default();
+        assert_eq!(equal.chances(legal.view()).unwrap().to_vec(), [1.0 / 3.0, 0.0, 1.0 / 3.0, 1.0 / 3.0]);
         // Where all that is legal has no odds, nothing happens.
         let none = Array1::from_vec(vec![false, false, true, false]);
         assert_eq!(agent.choose(&Observation::zeros(), &mut none.to_vec(), &mut rng), None);
+    }
+
+    /// Rows that say how often they were asked for.
+    struct Asked(Vec<bool>, Vec<u32>);
+
+    impl Mask for Asked {
+        fn is_legal(&mut self, row: usize) -> bool {
+            self.1[row] += 1;
+            self.0[row]
+        }
+
+        fn all(&mut self) -> Option<Array1<bool>> {
+            self.1.iter_mut().for_each(|asked| *asked += 1);
+            self.0.all()
+        }
+
+        fn rows(&self) -> usize {
+            self.0.len()
+        }
+    }
+
+    #[test]
+    fn only_rows_that_are_drawn_are_asked_for_and_the_rare_one_comes_all_the_same() {
+        let mut rng = stream(6, Stream::Exploration, 0);
+        let mut agent = MaskedRandom::default();
+        let mut half = Asked((0..1000).map(|row| row % 2 == 0).collect(), vec![0; 1000]);
+        for _ in 0..100 {
+            let row = agent.choose(&Observation::zeros(), &mut half, &mut rng).unwrap();
+            assert_eq!(row % 2, 0);
+        }
+        let asked: u32 = half.1.iter().sum();
+        assert!((150..260).contains(&asked), "{asked} of 100,000");
+        // Of one in a thousand, all are asked for in nearly each step, and it comes.
+        let mut rare = Asked((0..1000).map(|row| row == 7).collect(), vec![0; 1000]);
+        for _ in 0..20 {
+            assert_eq!(agent.choose(&Observation::zeros(), &mut rare, &mut rng), Some(7));
+        }
+        let mut none = Asked(vec![false; 5], vec![0; 5]);
+        assert_eq!(agent.choose(&Observation::zeros(), &mut none, &mut rng), None);
     }
 
     #[test]
@@ -155,8 +208,9 @@ mod tests {
         let mut rng = stream(4, Stream::Exploration, 0);
         let mut agent = MaskedRandom::default();
         let rate = |action, chance| RowOdds::Chance { action, chance };
-        agent
-            .weigh(&|| vec![rate(0, 0.1), rate(0, 0.1), rate(1, 0.05), RowOdds::Share(1), RowOdds::Share(3)]);
+        agent.weigh(&|| {
+            vec![rate(0, 0.1), rate(0, 0.1), rate(1, 0.05), RowOdds::Share(1.0), RowOdds::Share(3.0)]
+        });
         for (legal, wanted) in [
             ([true; 5], [0.05, 0.05, 0.05, 0.2125, 0.6375]),
             // One of its rows has all of an action's rate; the share of what is not legal is the others'.

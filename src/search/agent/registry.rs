@@ -42,7 +42,7 @@ pub const REGISTRY: &[Entry] = &[
     },
     Entry {
         name: "random",
-        summary: "by chance among the rows that the rules allow at the moment, each as likely unless the space gives odds",
+        summary: "by chance among the rows that the rules allow at the moment: each action as likely, weather and time in 15 % of the steps, unless the space gives odds",
         kind: Kind::Ready(|| Box::new(random::MaskedRandom::default())),
     },
     Entry {

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use crate::action::draw::Judge;
 use crate::action::{Course, Effect, LaneChangeRules, Surroundings};
+use avastra_lang::model::expr::Expr;
 use avastra_lang::model::{
-    ActionDef, Facts, Memory, Road, Row, RulesInForce, Space, Type, Value, WorldFacts, evaluate,
+    ActionDef, EffectDef, Facts, Memory, Road, Row, RulesInForce, Space, Type, Value, WorldFacts, evaluate,
 };
 
 /// The rows that an agent chooses from.
@@ -29,11 +30,15 @@ pub struct Situation<'a> {
     pub happened_s: &'a [f64],
 }
 
+/// The part of the steps in which actions that only set states come, by the balanced odds. Half of the rows of `avastra45.ava` are such, and
+/// weather alone hits nobody. Ours.
+const SETTING_SHARE: f64 = 0.15;
+
 /// How often a row is drawn by chance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RowOdds {
     /// Relative to the other rows that have shares.
-    Share(u32),
+    Share(f64),
     /// Its action comes in this part of the steps, whichever of its rows is legal.
     Chance { action: usize, chance: f64 },
 }
@@ -101,26 +106,54 @@ impl ActionTable {
         &self.space.rows
     }
 
-    /// How often each row is drawn by chance.
+    /// How often each row is drawn by chance: by `odds actions`, or else [balanced](ActionTable::balanced).
     pub fn odds(&self, situation: &Situation<'_>) -> Vec<RowOdds> {
         let Situation { memory, road, .. } = *situation;
         let space = &self.space;
-        let asks = |action: &ActionDef| action.odds.asks_the_world();
-        let bearers = || space.actions.iter().flat_map(|action| action.odds.bearers(space.bearers.len()));
-        let world = space.actions.iter().any(asks).then(|| world_facts(situation, bearers()));
+        let declared: Option<Vec<&Expr>> = space.actions.iter().map(|action| action.odds.as_ref()).collect();
+        let Some(declared) = declared else { return self.balanced() };
+        let bearers = || declared.iter().flat_map(|odds| odds.bearers(space.bearers.len()));
+        let asks_the_world = declared.iter().any(|odds| odds.asks_the_world());
+        let world = asks_the_world.then(|| world_facts(situation, bearers()));
         let facts = Facts { road: Some(&road.facts), world: world.as_ref(), ..Facts::new(&[], memory) };
-        let odds = |(action, ActionDef { odds, .. }): (usize, &ActionDef)| {
+        let odds = |(action, odds): (usize, &&Expr)| {
             let value = evaluate(odds, &space.functions, &facts).number();
             match odds.ty {
                 // What has no value (a division by 0) never comes.
                 Type::Quantity(_) => {
                     RowOdds::Chance { action, chance: (value * space.episode.step_s).max(0.0) }
                 }
-                Type::Int | Type::Bool | Type::Enum(_) => RowOdds::Share(value as u32),
+                Type::Int | Type::Bool | Type::Enum(_) => RowOdds::Share(value),
             }
         };
-        let of_actions: Vec<RowOdds> = space.actions.iter().enumerate().map(odds).collect();
+        let of_actions: Vec<RowOdds> = declared.iter().enumerate().map(odds).collect();
         self.rows().iter().map(|row| of_actions[row.action]).collect()
+    }
+
+    /// Odds by which each action is as likely as another, but those that only set states (weather, time) have [`SETTING_SHARE`]
+    /// together. The rows of an action share what it has.
+    fn balanced(&self) -> Vec<RowOdds> {
+        let actions = &self.space.actions;
+        let only_sets =
+            |action: &ActionDef| action.effects.iter().all(|effect| matches!(effect, EffectDef::Set(_)));
+        let sets: Vec<bool> =
+            actions.iter().map(|action| !action.effects.is_empty() && only_sets(action)).collect();
+        let mut rows = vec![0_u32; actions.len()];
+        self.rows().iter().for_each(|row| rows[row.action] += 1);
+        let number = |wanted: bool| {
+            let counted = sets.iter().zip(&rows).filter(|(sets, rows)| **sets == wanted && **rows > 0);
+            counted.count() as f64
+        };
+        let (setting, others) = (number(true), number(false));
+        let share = |row: &Row| {
+            let of_action = match sets[row.action] {
+                _ if setting == 0.0 || others == 0.0 => 1.0,
+                true => SETTING_SHARE / setting,
+                false => (1.0 - SETTING_SHARE) / others,
+            };
+            RowOdds::Share(of_action / f64::from(rows[row.action]))
+        };
+        self.rows().iter().map(share).collect()
     }
 
     /// One offer for each row. Every row draws from a stream of its own, so that one row's draws do not

@@ -42,8 +42,8 @@ class Follower(avastra.Driver):
     def on_the_way(self, step, front):
         for other in step.objects:
             beside = self.way.path.project(other.x, other.y)
-            # Who drives along a lane keeps to it; a person may take a step.
-            room = 1.2 if other.kind == "pedestrian" else 0.3
+            # Who drives along a lane keeps to it; a person who walks may be there soon.
+            room = 3.0 if other.kind == "pedestrian" and other.speed > 0.2 else 0.5
             if beside.station > front and abs(beside.offset) < (self.vehicle.width + other.width) / 2.0 + room:
                 yield beside.station - other.length / 2.0 - front, other
 
