@@ -37,7 +37,7 @@ REFUSED = ROOT / "target/mutants/refused.json"
 #: Of each subject: files; the crates whose unit tests belong to them; and those of `tests/it` that do.
 SUBJECTS = {
     "judging": [
-        (["src/world/sim/right_of_way.rs", "src/world/sim/right_of_way/*.rs"],
+        (["src/world/behave/right_of_way/*.rs", "src/world/state/passed.rs", "src/world/state/rights.rs"],
          ["avastra-world", "avastra-campaign"], ["situations::", "verdicts::"]),
         ([f"src/campaign/{name}.rs" for name in ("episode/precrash", "oracle/avoidable", "oracle/counted")],
          ["avastra-campaign"], ["situations::", "verdicts::", "r157::", "suites::"]),

@@ -39,5 +39,9 @@
 pub mod action;
 mod scene;
 mod state;
+mod view;
+mod behave;
+mod place;
+mod step;
 pub mod sim;
 pub mod places;

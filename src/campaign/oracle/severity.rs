@@ -4,7 +4,7 @@
 //! `m2 / (m1 + m2)` of the speed at which it closes where they meet. What slides along the contact changes nothing,
 //! so a scrape at 20 m/s is no crash at 20 m/s. Both are taken to be hit in line with their centres; an impact
 //! beside them turns the bodies and changes their velocity less, so this is an upper bound. The world carries the same
-//! impact out (`sim::contact`), as far as a car can follow: neither backwards nor sideways.
+//! impact out (`world::step::contact`), as far as a car can follow: neither backwards nor sideways.
 //!
 //! What that means for people is told in three classes ([`Harm`]), by the speed at which one in ten is seriously injured
 //! (MAIS 3 and more). Such speeds describe whole populations of people and cars, so they order findings, and tell of no

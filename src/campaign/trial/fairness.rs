@@ -1,6 +1,6 @@
 //! Whether a road user appeared fairly, judged from the outside.
 //!
-//! Written apart from the rule `no_teleport` and from `sim::placement`, which it tests: plain formulas that ignore
+//! Written apart from the rule `no_teleport` and from `world::place`, which it tests: plain formulas that ignore
 //! the time in which a brake builds up, and so ask for a little less.
 
 use avastra_base::geometry::distance_m;

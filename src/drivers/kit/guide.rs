@@ -130,7 +130,7 @@ impl Guide {
                 }
             })
             .collect();
-        // `sim::way` has a pass like this over its own vertices; see there why they are two.
+        // `scene::way` has a pass like this over its own vertices; see there why they are two.
         for index in (0..count - 1).rev() {
             let next_mps = samples[index + 1].speed_mps_max;
             let reachable_mps = (next_mps * next_mps + 2.0 * rules.slowdown_mps2 * SPACING_M).sqrt();

@@ -2,7 +2,7 @@
 //!
 //! The plan goes through Apollo's cascade (`kit::Pedals`), whose acceleration the calibration table turns into
 //! pedals. Left out: Apollo's low-pass filters of the steering angle (10 Hz, above what the actuator follows) and
-//! its calibration by speed (see `sim::ego`).
+//! its calibration by speed (see `world::step::ego`).
 
 use std::sync::Arc;
 

@@ -4,7 +4,7 @@
 //! Made once for a map from its lanes alone. Where the way of another vehicle passes through the area,
 //! and when, is for the drivers to judge (see `manners`). Lanes that leave the same lane are no
 //! conflict: a vehicle on one of them follows the vehicle ahead. Where lights differ, they decide before any
-//! of this (see `right_of_way`).
+//! of this (see `behave::right_of_way`).
 
 use avastra_base::geometry::wrap_angle;
 use avastra_road::{Lane, LaneIndex, RoadMap, Route, RouteLane, Turn};

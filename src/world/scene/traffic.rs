@@ -11,7 +11,7 @@ use avastra_lang::syntax::{listed, yaml_mistake};
 section! {
     /// How other vehicles drive.
     pub struct TrafficProfile {
-        /// Whether ambient vehicles yield to the ego vehicle at junctions. Commanded ones never do: see `npc::manners`.
+        /// Whether ambient vehicles yield to the ego vehicle at junctions. Commanded ones never do: see `behave::npc::manners`.
         yields_to_ego: bool = true;
         /// Whether ambient vehicles take their right of way before the ego vehicle: they expect that it keeps the rules, and brake for one that does not only once it is where their ways cross. Ours.
         takes_right: bool = false;

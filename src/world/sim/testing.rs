@@ -12,10 +12,10 @@ use avastra_lang::model::vocabulary::{
 use avastra_road::testing::{lanes, road, street};
 use avastra_road::{RoadMap, Route};
 
-use super::world::{Start, World};
 use crate::scene::Scene;
 use crate::scene::traffic::TrafficProfile;
 use crate::state::trace::Trace;
+use crate::state::world::{Start, World};
 
 /// A driving lane without links.
 fn plain(id: i32) -> (i32, &'static str, f64, &'static str) {

@@ -19,7 +19,7 @@ use avastra_lang::model::body::{Changes, OwnBody, parameters};
 use avastra_lang::model::vocabulary::{Body, LaneChoice, Level, Light, Phenomenon, Side, Then, Verb, Word};
 
 /// Holds a speed and the route, whatever is in the way, by aiming at a point ahead (pure pursuit).
-pub(super) fn hold(world: &World, speed_mps: f64) -> Control {
+pub(crate) fn hold(world: &World, speed_mps: f64) -> Control {
     let ego = world.ego();
     let (throttle_pct, brake_pct) = pedals_for(2.0 * (speed_mps - ego.speed_mps));
     let ahead_m = 3.0 + 0.5 * ego.speed_mps;

@@ -1,6 +1,24 @@
-//! Plain data of a moment: time, what is sensed, the colours of lights, and the digest over it.
+//! Plain data of a moment, each with what follows from it alone: the world, the ego vehicle, road users and what moves them, weather,
+//! lights, time, what is sensed, and the digest over all of it.
 
-pub(crate) mod sensed;
-pub(crate) mod signals;
-pub(crate) mod time;
-pub(crate) mod trace;
+pub mod ambient;
+pub mod change;
+pub mod contact;
+pub mod driver;
+pub mod ego;
+pub mod environment;
+pub mod guided;
+pub mod manoeuvre;
+pub mod obstacle;
+pub mod passed;
+pub mod pedestrian;
+pub mod pursuit;
+pub mod rights;
+pub mod road_user;
+pub mod ruling;
+pub mod sensed;
+pub mod signals;
+pub mod stroller;
+pub mod time;
+pub mod trace;
+pub mod world;

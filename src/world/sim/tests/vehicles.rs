@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use crate::action::{Effect, OrderRequest, SpawnRequest, Surroundings};
 use crate::scene::way::body_at;
-use crate::sim::body::BodyParameters;
 use crate::sim::testing::request;
-use crate::sim::{Control, DT_S, Scene, Start, TrafficProfile, World, body, testing};
+use crate::sim::{Control, DT_S, Scene, Start, TrafficProfile, World, testing};
 use avastra_base::geometry::{OrientedBox, Path, Pose, Vec2, distance_m};
+use avastra_lang::model::body::{self, BodyParameters};
 use avastra_lang::model::vocabulary::{
     Body, LaneChoice, Level, Phenomenon, Side, Then, TrafficRule, Verb, Word,
 };

@@ -1,0 +1,85 @@
+//! What a driver was told to do beside another one, and how far it is with it.
+
+use avastra_lang::model::command::Command;
+use avastra_road::LaneIndex;
+
+use crate::state::trace::Trace;
+
+#[derive(Debug, Clone, Copy)]
+pub struct Pursuit {
+    pub aim: Aim,
+    /// The fastest that it drives for this, m/s; without it the limit of its lane.
+    pub speed_mps_max: Option<f64>,
+    /// The lane in which its way crosses that of the ego vehicle, once that is known; until then it drives on as it does.
+    pub crosses_in: Option<LaneIndex>,
+    /// Whether the gap was as wanted once.
+    pub is_met: bool,
+    /// By how much it misses its moment if both go on as they do, s; `None` if the ego vehicle has not kept its speed.
+    pub late_s: Option<f64>,
+    pub ego_keeps: EgoKeeps,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub enum Aim {
+    /// To the road user of that id, or to the ego vehicle.
+    Gap(Gap, Option<u32>),
+    /// Its front is there so much before that of the ego vehicle, s: at this station of the ego vehicle's route, or where its way
+    /// crosses that.
+    Place { early_s: f64, station_m: Option<f64> },
+}
+
+#[derive(Debug, Clone, Copy)]
+pub enum Gap {
+    /// m.
+    Way(f64),
+    /// s, of the one behind.
+    Time(f64),
+}
+
+impl Pursuit {
+    pub fn told(command: &Command, to: Option<u32>) -> Option<Pursuit> {
+        let Command { speed_mps: speed_mps_max, keep_m, keep_s, early_s, at_m, .. } = *command;
+        let gap = keep_m.map(Gap::Way).or(keep_s.map(Gap::Time)).map(|gap| Aim::Gap(gap, to));
+        let place = early_s.map(|early_s| Aim::Place { early_s, station_m: at_m });
+        Some(Pursuit {
+            aim: gap.or(place)?,
+            speed_mps_max,
+            crosses_in: None,
+            is_met: false,
+            late_s: None,
+            ego_keeps: EgoKeeps::default(),
+        })
+    }
+
+    pub fn trace(&self, trace: &mut Trace) {
+        // By how much it is late moves nothing.
+        let Pursuit { aim, speed_mps_max, crosses_in, is_met, late_s: _, ego_keeps: _ } = *self;
+        let (kind, to, numbers) = match aim {
+            Aim::Gap(Gap::Way(gap_m), to) => (0, to, [gap_m, 0.0]),
+            Aim::Gap(Gap::Time(gap_s), to) => (1, to, [gap_s, 0.0]),
+            Aim::Place { early_s, station_m } => (2, None, [early_s, station_m.unwrap_or(f64::INFINITY)]),
+        };
+        trace.flags([to.is_some(), crosses_in.is_some(), speed_mps_max.is_some(), is_met]);
+        trace.word(kind);
+        trace.words(to.map(u64::from));
+        trace.words(crosses_in.map(|lane| lane.0 as u64));
+        trace.numbers(numbers);
+        trace.numbers(speed_mps_max);
+    }
+}
+
+/// Whether the ego vehicle has kept the speed that it had at the first look, within a tenth and half a metre per second.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct EgoKeeps {
+    pub first_mps: Option<f64>,
+    pub is_lost: bool,
+}
+
+impl EgoKeeps {
+    /// Whether it has, up to now. One that is slower than `standing_mps` has not.
+    pub fn look(&mut self, now_mps: f64, standing_mps: f64) -> bool {
+        let first_mps = *self.first_mps.get_or_insert(now_mps);
+        self.is_lost |= now_mps < standing_mps || (now_mps - first_mps).abs() > 0.1 * first_mps + 0.5;
+        !self.is_lost
+    }
+}

@@ -1,0 +1,114 @@
+//! What is remembered of a road user and the ego vehicle, as far as priority depends on it.
+
+use avastra_base::geometry::Vec2;
+use avastra_lang::model::vocabulary::Priority;
+use avastra_road::LaneIndex;
+
+use crate::state::passed::Passed;
+use crate::state::ruling::{Rule, Ruling};
+use crate::state::time::DT_S;
+use crate::state::trace::Trace;
+
+/// What was found holds for so long after the two have left each other's way, s. Ours: outlines that touch behind
+/// a junction do so because of what happened in it.
+const HOLDS_S: f64 = 2.0;
+
+/// What is remembered of a road user and the ego vehicle, as far as priority depends on it.
+#[derive(Debug, Clone, Default)]
+pub struct Rights {
+    /// The lines that the road user passed last.
+    pub passed: Passed,
+    /// Whether it and the ego vehicle are in one lane, or it is a pedestrian in the ego vehicle's way; `None` before
+    /// the first look.
+    pub shares: Option<bool>,
+    pub meeting: Option<Meeting>,
+    /// Who has priority if it is a wreck in the ego vehicle's way, and since when, s; `None` if it is not.
+    pub wreck: Option<(Priority, f64)>,
+    /// Whether it came into the ego vehicle's way, or the ego vehicle into its, and left room.
+    pub left_room: bool,
+    /// Where it has stood since a moment at which the ego vehicle saw it and could brake gently for it.
+    pub foreseen: Option<Foreseen>,
+    /// Where a pedestrian was last looked for on the carriageway, and whether it was there: most stand and wait.
+    pub on_road: Option<(Vec2, bool)>,
+}
+
+impl Rights {
+    /// Who goes first, as long as what was found about the two holds.
+    pub fn now(&self, tick: u64) -> Priority {
+        let wreck = self.wreck.map(|(priority, _)| priority);
+        wreck.or(self.held(tick).map(|ruling| ruling.priority)).unwrap_or(Priority::None)
+    }
+
+    /// What was found about the two, as long as it holds.
+    pub fn held(&self, tick: u64) -> Option<Ruling> {
+        self.meeting.filter(|meeting| meeting.holds(tick)).map(|meeting| meeting.ruling)
+    }
+
+    pub fn trace(&self, trace: &mut Trace) {
+        // What was found on the road follows from the pedestrian's position; a rule, its moments and whether a
+        // vehicle waits from what was traced before.
+        let Rights { passed, shares, meeting, wreck, foreseen, left_room, on_road: _ } = self;
+        passed.trace(trace);
+        trace.flags([
+            shares.is_some(),
+            *shares == Some(true),
+            meeting.is_some(),
+            wreck.is_some(),
+            foreseen.is_some(),
+            *left_room,
+        ]);
+        trace.words(wreck.map(|(priority, _)| priority as u64));
+        if let Some(Meeting { place, ruling, tick, waits: _, rests_s: _ }) = *meeting {
+            let (ego, other) = match place {
+                Place::Area(ego, other) => (ego.0 as u64, other.0 as u64),
+                Place::Lane => (u64::MAX, u64::MAX),
+            };
+            trace.words([ego, other, ruling.priority as u64, tick]);
+        }
+    }
+}
+
+/// The road user or the ego vehicle came into the other's way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Meeting {
+    pub place: Place,
+    pub ruling: Ruling,
+    /// Last tick in which they were in each other's way.
+    pub tick: u64,
+    /// Whether the first of the two, which may clear the junction, waits beside the other's way.
+    pub waits: bool,
+    /// When the one behind could have come to rest by braking gently, s since the episode began; never in a junction.
+    pub rests_s: f64,
+}
+
+impl Meeting {
+    pub fn new(place: Place, ruling: Ruling, tick: u64) -> Meeting {
+        Meeting { place, ruling, tick, waits: false, rests_s: f64::INFINITY }
+    }
+
+    /// Whether the two were in each other's way a short time ago.
+    pub fn holds(&self, tick: u64) -> bool {
+        (tick - self.tick) as f64 * DT_S <= HOLDS_S
+    }
+
+    /// Whether the first of the two left the other room, and may clear the junction.
+    pub fn is_clearing(&self) -> bool {
+        self.ruling.rule == Rule::Clearing
+    }
+}
+
+/// A vehicle that the ego vehicle saw standing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Foreseen {
+    pub at: Vec2,
+    /// Whether it stood across the strip that the ego vehicle drives on.
+    pub blocks: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Place {
+    /// In a junction: the lanes of the ego vehicle and of the road user.
+    Area(LaneIndex, LaneIndex),
+    /// In a lane, or on foot on the carriageway.
+    Lane,
+}

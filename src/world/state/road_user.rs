@@ -1,0 +1,235 @@
+//! A road user other than the ego vehicle: what others may see of it ([`Obstacle`]), and its hidden side ([`Mover`]).
+
+use avastra_base::geometry::{OrientedBox, Pose, Sweep, Vec2};
+use avastra_lang::model::body::BodyParameters;
+use avastra_lang::model::vocabulary::TrafficRule;
+
+use crate::state::driver::Driver;
+use crate::state::guided::Guided;
+use crate::state::manoeuvre::{PhaseCount, Running};
+use crate::state::obstacle::Obstacle;
+use crate::state::pedestrian::Walker;
+use crate::state::rights::Rights;
+use crate::state::stroller::Stroller;
+use crate::state::trace::Trace;
+
+/// One road user of the world.
+#[derive(Debug, Clone)]
+pub struct RoadUser {
+    pub obstacle: Obstacle,
+    pub mover: Mover,
+}
+
+impl RoadUser {
+    /// Every bit that later ticks depend on.
+    pub fn trace(&self, trace: &mut Trace) {
+        let RoadUser { obstacle, mover } = self;
+        let Obstacle {
+            id,
+            body,
+            colour,
+            verb,
+            outline,
+            velocity_mps,
+            spawned_tick,
+            lights,
+            // These follow from the body, the outline, the way and the ego vehicle, now and in the ticks before.
+            forward: _,
+            height_m: _,
+            lane_heading_rad: _,
+            acceleration_mps2: _,
+            elevation_m: _,
+            is_apart: _,
+            distance_m: _,
+        } = obstacle;
+        trace.words([
+            u64::from(*id),
+            *spawned_tick,
+            *body as u64,
+            *colour as u64,
+            *verb as u64,
+            *lights as u64,
+        ]);
+        let pose = &outline.pose;
+        trace.numbers([pose.position.x, pose.position.y, pose.heading_rad]);
+        trace.numbers([velocity_mps.x, velocity_mps.y]);
+        mover.trace(trace);
+    }
+}
+
+/// The hidden side of a road user.
+#[derive(Debug, Clone)]
+pub struct Mover {
+    pub size: BodyParameters,
+    pub motion: Motion,
+    /// Whether it and the ego vehicle have touched, whichever ran into the other.
+    pub touched: bool,
+    /// The obstacle that it touched last: it slides to rest.
+    pub crashed_with: Option<u32>,
+    /// Ticks that it has been a wreck at rest.
+    pub rest_ticks: u32,
+    /// Part of it that the ego vehicle's sensors saw when they last looked.
+    pub visible_fraction: f64,
+    /// Which of the two has priority: it or the ego vehicle.
+    pub rights: Rights,
+    /// The name that its action gave it, by index in the space.
+    pub bearer: Option<usize>,
+    /// The manoeuvre that it does, until it ends or an order replaces it.
+    pub course: Option<Running>,
+    /// How many phases of its last manoeuvre have begun, and ended, and how many there are. Nothing depends on them.
+    pub phases: PhaseCount,
+}
+
+impl Mover {
+    pub fn new(size: BodyParameters, motion: Motion) -> Mover {
+        Mover {
+            size,
+            motion,
+            touched: false,
+            crashed_with: None,
+            rest_ticks: 0,
+            visible_fraction: 1.0,
+            rights: Rights::default(),
+            bearer: None,
+            course: None,
+            phases: PhaseCount::default(),
+        }
+    }
+
+    /// Height of the road on its way, m; `None` for what has no way.
+    pub fn elevation_m(&self) -> Option<f64> {
+        match &self.motion {
+            Motion::Drive(driver) => Some(driver.way.height_at(driver.station_m)),
+            Motion::Stroll(stroller) => Some(stroller.height_m()),
+            Motion::Guide(guided) => Some(guided.height_m()),
+            Motion::Walk(_) | Motion::Stand => None,
+        }
+    }
+
+    /// Whether it does nothing any more but come to rest.
+    pub fn is_wreck(&self) -> bool {
+        self.touched || self.crashed_with.is_some()
+    }
+
+    /// By how much it missed the moment of its last `early`, s; below 0 if it was too soon. `None` before that.
+    pub fn late_s(&self) -> Option<f64> {
+        match &self.motion {
+            Motion::Drive(driver) => driver.late_s,
+            Motion::Guide(guided) => guided.late_s.filter(|_| guided.has_met()),
+            Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => None,
+        }
+    }
+
+    /// Whether it is an emergency vehicle under way.
+    pub fn has_siren(&self) -> bool {
+        matches!(&self.motion, Motion::Drive(driver) if driver.has_siren)
+    }
+
+    /// Whether it drives a lane change; `None` of what no driver leads along lanes.
+    pub fn changes_lanes(&self) -> Option<bool> {
+        match &self.motion {
+            Motion::Drive(driver) => Some(driver.is_changing_lanes()),
+            Motion::Guide(_) | Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => None,
+        }
+    }
+
+    /// Whether it drives, and ignores a rule of the road.
+    pub fn ignores(&self, rule: TrafficRule) -> bool {
+        matches!(&self.motion, Motion::Drive(driver) if driver.ignores.contains(rule))
+    }
+
+    /// Whether it drives without lights.
+    pub fn is_unlit(&self) -> bool {
+        self.ignores(TrafficRule::Headlights)
+    }
+
+    /// Whether it has crashed into another obstacle, or another into it.
+    pub fn has_crashed(&self) -> bool {
+        self.crashed_with.is_some()
+    }
+
+    /// Whether it stands and will not go by itself: a wreck, a driver that has given up waiting, or one that was asked to
+    /// stand.
+    pub fn is_stuck(&self, this: &Obstacle) -> bool {
+        match &self.motion {
+            _ if self.is_wreck() => this.velocity_mps == Vec2::zeros(),
+            // One that stands within a manoeuvre may go on by itself.
+            Motion::Drive(driver) => driver.has_given_up() || self.course.is_none() && driver.is_parked(),
+            Motion::Guide(guided) => self.course.is_none() && guided.speed_mps == 0.0,
+            Motion::Walk(_) | Motion::Stroll(_) | Motion::Stand => false,
+        }
+    }
+
+    /// The area that it sweeps within a tick.
+    pub fn sweep(&self, mut start: OrientedBox, end: Pose) -> Sweep {
+        let on_foot = match &self.motion {
+            Motion::Walk(_) | Motion::Stroll(_) => true,
+            Motion::Guide(guided) => guided.turns_on_the_spot(),
+            Motion::Drive(_) | Motion::Stand => false,
+        };
+        if on_foot {
+            // A person turns round on the spot, so the corners of its box must not sweep half a circle within a tick.
+            start.pose.heading_rad = end.heading_rad;
+        }
+        Sweep { start, end }
+    }
+
+    /// It touched the ego vehicle: from now on it goes at most `speed_mps`, until its brakes stop it.
+    pub fn touch(&mut self, speed_mps: f64) {
+        self.touched = true;
+        if let Motion::Drive(driver) = &mut self.motion {
+            driver.speed_mps = speed_mps;
+        }
+    }
+
+    /// It and another obstacle touched: from now on it slides to rest. Returns the obstacle that it had
+    /// touched last.
+    pub fn crash(&mut self, other: u32) -> Option<u32> {
+        if let Motion::Drive(driver) = &mut self.motion {
+            driver.speed_mps = 0.0;
+        }
+        self.crashed_with.replace(other)
+    }
+
+    pub fn trace(&self, trace: &mut Trace) {
+        let Mover {
+            motion,
+            touched,
+            crashed_with,
+            rest_ticks,
+            visible_fraction,
+            rights,
+            bearer,
+            course,
+            // No tick changes it.
+            size: _,
+            // No tick reads it.
+            phases: _,
+        } = self;
+        // Which name and which manoeuvre is left out: they are numbered as the space declares them, and what is declared beside
+        // them changes no episode.
+        trace.flags([*touched, crashed_with.is_some(), bearer.is_some(), course.is_some()]);
+        trace.words(crashed_with.iter().chain([rest_ticks]).copied().map(u64::from));
+        trace.number(*visible_fraction);
+        if let Some(running) = course {
+            running.trace(trace);
+        }
+        rights.trace(trace);
+        match motion {
+            Motion::Drive(driver) => driver.trace(trace),
+            Motion::Walk(walker) => walker.trace(trace),
+            Motion::Stroll(stroller) => stroller.trace(trace),
+            Motion::Guide(guided) => guided.trace(trace),
+            Motion::Stand => {}
+        }
+    }
+}
+
+#[derive(Debug, Clone)]
+pub enum Motion {
+    Drive(Driver),
+    Walk(Walker),
+    Stroll(Stroller),
+    Guide(Guided),
+    Stand,
+}
