@@ -30,7 +30,7 @@ if [ "${1-}" = tick ]; then
     for avastra in "$@"; do
         for ads in idm modular; do
             rm -rf "$work/run"
-            counted within_ticks --toggle-collect='*World::tick*' "$avastra" run scenarios/avastra45.ava --road boulevard \
+            counted within_ticks --toggle-collect='*World*::tick*' "$avastra" run scenarios/avastra45.ava --road boulevard \
                 --ads "$ads" --agent none --ambient 8 --seed 3 --episodes 3 --jobs 1 --quiet --out "$work/run"
             echo "$avastra $ads: $(sed -n 's/.*Collected : //p' "$work/within_ticks.log") instructions within ticks"
         done
@@ -51,11 +51,11 @@ if [ "${1-}" = law ]; then
 fi
 for ads in modular idm; do
     counted "tick.$ads" --toggle-collect='marks::Drive::tick' "$1/marks" "ticks_per_s_$ads"
-    python3 benches/profile.py "$work/tick.$ads" 'World::tick$' tick "$ads"
+    python3 benches/profile.py "$work/tick.$ads" 'World(>|)::tick$' tick "$ads"
 done
 for ads in modular idm; do
     rm -rf "$work/run"
     counted "run.$ads" "$1/avastra" run scenarios/avastra45.ava --ads "$ads" --traffic released --episodes 5 --jobs 1 \
         --quiet --out "$work/run"
-    python3 benches/profile.py "$work/run.$ads" 'Play::observation_period$' step "run of 20 episodes, $ads"
+    python3 benches/profile.py "$work/run.$ads" 'Play::step$' step "run of 20 episodes, $ads"
 done

@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 use avastra_base::outside::Shown;
 use avastra_campaign::run::{self, Asked, Profile, RunError, driving_system};
 use avastra_drivers::external::{Attached, ExternalSettings, Target};
 use avastra_drivers::{EXTERNAL, ModularConfig, REGISTRY};
-use avastra_lang::check::{self, KnownSpaces, Loaded, ReadError};
+use avastra_lang::check::{self, KnownSpaces, Loaded, MapCache, ReadError};
 use avastra_lang::model::{Policy, Scenario, Space};
 use avastra_lang::syntax::{nearest, yaml_mistake};
 use avastra_world::action::ActionTable;
@@ -41,6 +41,9 @@ const FILE_BYTES_MAX: u64 = 64 << 20;
 
 /// Larger sources are refused: the policy of a network with 500,000 weights has 2.7 MiB.
 const SOURCE_BYTES_MAX: u64 = 4 << 20;
+
+/// Maps that this process has read, by name and content: most commands read a space more than once.
+static MAPS: LazyLock<Mutex<MapCache>> = LazyLock::new(Mutex::default);
 
 /// Reads and checks a file with everything that it uses. Diagnostics are printed.
 ///
@@ -91,7 +94,26 @@ pub fn check_text(path: &Path, text: &str) -> Result<Loaded, Failure> {
 }
 
 fn check_read(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, Failure> {
-    judged(path, check::load(path, read))
+    judged(path, read_once(path, read))
+}
+
+/// Reads a file with everything that it uses, but no map a second time.
+fn read_once(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, ReadError> {
+    let known = || MAPS.lock().unwrap_or_else(PoisonError::into_inner);
+    // A copy, so that threads read at the same time.
+    let mut maps = known().clone();
+    let loaded = check::load_with(path, read, &mut maps);
+    *known() = maps;
+    loaded
+}
+
+/// The files of a space that was read and judged before.
+///
+/// # Errors
+/// As [`load`].
+pub fn files_of(space: &Path) -> Result<Loaded, Failure> {
+    let loaded = read_once(space, &reader(space)).map_err(|error| Failure::file("read", space, error))?;
+    without_mistakes(loaded)
 }
 
 fn judged(path: &Path, loaded: Result<Loaded, ReadError>) -> Result<Loaded, Failure> {

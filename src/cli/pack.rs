@@ -50,7 +50,7 @@ pub fn pack(output: &Output, files: &[PathBuf], folder: &Path) -> Result<(), Fai
 /// Copies a space with all that it uses into a folder, and returns the path of its copy. Its diagnostics are not printed,
 /// because it was read before.
 pub fn pack_space(space: &Path, folder: &Path) -> Result<PathBuf, Failure> {
-    let loaded = load::without_mistakes(load::read_and_check(space)?)?;
+    let loaded = load::files_of(space)?;
     let space = absolute(space)?;
     let moves = moves(&loaded, folder)?;
     let mut plan = Plan::default();

@@ -6,6 +6,8 @@
 //! 5 s. A road may say other times. Counted in ticks, so that the colour of any moment is exact. No vehicle
 //! detection, no pedestrian lights.
 
+use std::sync::Arc;
+
 use avastra_lang::model::SignalProgram;
 use avastra_lang::model::vocabulary::LightColour;
 use avastra_road::RoadMap;
@@ -56,6 +58,33 @@ const REPEAT_S: f64 = 720_720.0 * (GREEN_S + YELLOW_S + ALL_RED_S);
 pub(crate) struct SignalClock {
     offset_ticks: i64,
     program: Program,
+}
+
+/// What every signal shows, and until when.
+#[derive(Debug, Clone)]
+pub(crate) struct Shown {
+    /// By index in `RoadMap::signals`.
+    pub colours: Arc<[SignalColour]>,
+    /// The tick in which one of them changes.
+    until: u64,
+}
+
+impl Shown {
+    pub fn at(clock: &SignalClock, map: &RoadMap, tick: u64) -> Shown {
+        let all = 0..map.signals.len();
+        let left = all.clone().map(|signal| clock.around(map, signal, tick).1).min();
+        Shown {
+            colours: all.map(|signal| clock.colour(map, signal, tick)).collect(),
+            until: left.map_or(u64::MAX, |left| tick + left),
+        }
+    }
+
+    /// Brings it up to date in a tick. Nothing is worked out before one of them changes.
+    pub fn pass(&mut self, clock: &SignalClock, map: &RoadMap, tick: u64) {
+        if tick >= self.until {
+            *self = Shown::at(clock, map, tick);
+        }
+    }
 }
 
 /// The cycle of a signal: first it is green, then yellow, then red.

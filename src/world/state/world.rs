@@ -20,7 +20,7 @@ use crate::state::obstacle::Obstacle;
 use crate::state::passed::Passed;
 use crate::state::road_user::RoadUser;
 use crate::state::sensed::{Conditions, EgoMotion, SignalColour};
-use crate::state::signals::SignalClock;
+use crate::state::signals::{Shown, SignalClock};
 use crate::state::time::DT_S;
 use crate::state::trace::Trace;
 
@@ -103,6 +103,8 @@ pub struct World {
     pub(crate) environment: Environment,
     pub(crate) conditions: Conditions,
     pub(crate) signals: SignalClock,
+    /// What they show in this tick.
+    pub(crate) shown: Shown,
     /// What a light was told to show.
     pub(crate) switch: Option<Switch>,
     /// In order of appearance.
@@ -246,7 +248,7 @@ impl World {
 
     /// Colour of a signal now, by index in `RoadMap::signals`.
     pub fn signal(&self, signal: usize) -> SignalColour {
-        self.signals.colour(&self.scene.map, signal, self.ticks)
+        self.shown.colours[signal]
     }
 
     /// Colour of a signal at a tick that is past.
@@ -278,8 +280,9 @@ impl World {
             // No tick changes these.
             scene: _,
             traffic: _,
-            // It follows from the station.
+            // It follows from the station, and what is shown from the clock.
             ego_elevation_m: _,
+            shown: _,
             // It follows from the contacts, and they from what is traced.
             pushed_until: _,
             // No tick reads these.

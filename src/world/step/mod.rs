@@ -28,7 +28,7 @@ use crate::state::obstacle::Moved;
 use crate::state::passed::Passed;
 use crate::state::road_user::RoadUser;
 use crate::state::sensed::SignalColour;
-use crate::state::signals::SignalClock;
+use crate::state::signals::{Shown, SignalClock};
 use crate::state::time::{DT_S, FRAME_S, FRAME_TICKS, ticks};
 use crate::state::world::{Start, World};
 use crate::step::contact::{Party, meet};
@@ -64,6 +64,7 @@ impl World {
     /// The beginning of an episode that begins elsewhere on the route, at another speed.
     pub fn with_ego_at(scene: Arc<Scene>, start: &Start, station_m: f64, speed_mps: f64) -> World {
         let environment = Environment::new(start.time, start.sky);
+        let signals = SignalClock::new(start.signal_phase_s, scene.signal_program);
         let mut world = World {
             ticks: 0,
             ego: Ego::new(scene.route.path.pose_at(station_m), speed_mps),
@@ -75,7 +76,8 @@ impl World {
             pushed_until: 0,
             conditions: environment.conditions(speed_mps),
             environment,
-            signals: SignalClock::new(start.signal_phase_s, scene.signal_program),
+            shown: Shown::at(&signals, &scene.map, 0),
+            signals,
             switch: None,
             signals_until: Vec::new(),
             users: Vec::with_capacity(COMMANDED_MAX as usize),
@@ -130,6 +132,7 @@ impl World {
         self.users = users;
         self.measure();
         self.ticks += 1;
+        self.shown.pass(&self.signals, &self.scene.map, self.ticks);
         self.switch_light();
         if self.ambient.wanted > 0 && self.ticks.is_multiple_of(RENEWAL_TICKS) {
             self.renew_ambient(false);

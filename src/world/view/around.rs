@@ -12,7 +12,7 @@ use crate::state::obstacle::Obstacle;
 use crate::state::passed::Passed;
 use crate::state::pedestrian::Walker;
 use crate::state::road_user::{Motion, RoadUser};
-use crate::state::sensed::EgoMotion;
+use crate::state::sensed::{EgoMotion, SignalColour};
 use crate::state::signals::SignalClock;
 use crate::state::time::DT_S;
 use crate::state::world::World;
@@ -51,6 +51,8 @@ pub struct Around<'a> {
     /// All other road users: those before it in the world's order, and those after it.
     pub users: [&'a [RoadUser]; 2],
     pub signals: &'a SignalClock,
+    /// What each signal shows now.
+    pub shown: &'a [SignalColour],
     pub tick: u64,
     /// Friction under the ego vehicle.
     pub friction: f64,
@@ -224,6 +226,7 @@ impl World {
             ego_passed: self.ego_passed,
             users,
             signals: &self.signals,
+            shown: &self.shown.colours,
             tick: self.ticks,
             friction: self.conditions.friction,
             grip: self.environment.grip(),

@@ -190,7 +190,7 @@ impl Around<'_> {
 
     /// What a traffic light shows; `None` without one.
     fn light(&self, signal: Option<usize>) -> Light {
-        match signal.map(|signal| self.signals.colour(&self.scene.map, signal, self.tick)) {
+        match signal.map(|signal| self.shown[signal]) {
             None => Light::None,
             Some(SignalColour::Red) => Light::Red,
             Some(SignalColour::Yellow) => Light::Yellow,

@@ -226,7 +226,7 @@ fn ego_passage(area: &Area, around: &Around) -> Option<Passage> {
     let mut lanes = around.scene.route.lanes.iter();
     let lane = lanes.find(|part| part.lane == area.other && part.to_m > rear_m)?;
     let (from_m, to_m) = (lane.from_m + area.other_from_m, lane.from_m + area.other_to_m);
-    let is_red = |signal| around.signals.colour(&around.scene.map, signal, around.tick) == SignalColour::Red;
+    let is_red = |signal| around.shown[signal] == SignalColour::Red;
     let mut lines = around.scene.route.stop_lines.iter();
     let holds = lines.any(|line| (front_m - 1.0..from_m).contains(&line.station_m) && is_red(line.signal));
     Some(Passage {

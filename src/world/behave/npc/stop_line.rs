@@ -23,7 +23,7 @@ impl Driver {
         }
         let front_m = self.station_m + size.length_m / 2.0;
         let line = self.way.stop_lines.iter().find(|line| line.station_m > front_m)?;
-        let colour = || around.signals.colour(&around.scene.map, line.signal, around.tick);
+        let colour = || around.shown[line.signal];
         self.stops_within_m(line.station_m - front_m, || match colour() {
             SignalColour::Green => None,
             SignalColour::Yellow => Some(YELLOW_BRAKING_MPS2),

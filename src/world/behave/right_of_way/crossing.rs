@@ -7,7 +7,7 @@ use avastra_road::LaneIndex;
 use crate::behave::right_of_way::order::{by_lights, by_order};
 use crate::behave::right_of_way::passed::by_stops;
 use crate::behave::right_of_way::room::{ABRUPT_MPS2, APPROACH_M, allowed_mps, can_stop, room_before_m};
-use crate::behave::right_of_way::side::Side;
+use crate::behave::right_of_way::side::Beside;
 use crate::behave::right_of_way::vehicle::Vehicle;
 use crate::scene::junction::RouteArea;
 use crate::state::ego::VehicleParameters;
@@ -90,7 +90,7 @@ impl Crossing {
     /// Whether the one of the two that is in the area stands across the other's strip.
     pub fn is_blocked(&self, first: Mover, vehicle: &Vehicle, around: &Around) -> bool {
         match first {
-            Mover::Ego => Side::of(vehicle, false, around).is_some_and(|side| side.aside_m < 0.0),
+            Mover::Ego => Beside::of(vehicle, around).is_some_and(|beside| beside.aside_m < 0.0),
             Mover::Other | Mover::Both => room_before_m(vehicle.this, around).is_some(),
         }
     }

@@ -3,7 +3,7 @@
 use crate::behave::right_of_way::crossing::{Crossing, cuts_across};
 use crate::behave::right_of_way::on_foot::{Strip, on_foot, whatever_the_room};
 use crate::behave::right_of_way::room::{ABRUPT_MPS2, APPROACH_M, allowed_mps, can_stop, room_before_m};
-use crate::behave::right_of_way::side::{Side, beyond_middle};
+use crate::behave::right_of_way::side::{Beside, Side, beyond_middle};
 use crate::behave::right_of_way::vehicle::Vehicle;
 use crate::state::ego::VehicleParameters;
 use crate::state::obstacle::Obstacle;
@@ -97,7 +97,8 @@ impl Rights {
             Some(vehicle) => {
                 let by_lane = || {
                     let beyond = || beyond_middle(this, around, Some(point));
-                    Side::of(&vehicle, true, around)?.at_contact(beyond, around.time_s())
+                    let side = Beside::of(&vehicle, around)?.side(&vehicle, true, around);
+                    side.at_contact(beyond, around.time_s())
                 };
                 (found.or_else(by_lane), self.foreseen.is_some(), Rule::Standing)
             }
@@ -172,21 +173,23 @@ impl Rights {
             self.shares = None;
             return;
         }
-        let side = Side::of(vehicle, false, around);
-        let shares = side.as_ref().is_some_and(|side| side.aside_m < 0.0);
+        let beside = Beside::of(vehicle, around).filter(|beside| beside.aside_m < 0.0);
+        let shares = beside.is_some();
         let began = shares && self.shares == Some(false);
         self.shares = Some(shares);
-        let Some(side) = side.filter(|_| shares) else { return };
+        let Some(beside) = beside else { return };
+        let side = || beside.side(vehicle, false, around);
         let time_s = around.time_s();
         // Two that come into each other's way anew are judged anew.
         self.meeting = self.meeting.filter(|meeting| meeting.holds(around.tick));
         match &mut self.meeting {
             // There was time to brake gently since: from now on it is one vehicle behind another.
-            Some(meeting) if meeting.place == Place::Lane && meeting.is_over(&side, time_s) => {
+            Some(meeting) if meeting.place == Place::Lane && meeting.is_over(&side(), time_s) => {
                 self.meeting = None
             }
             Some(meeting) if meeting.place == Place::Lane => meeting.tick = around.tick,
             Some(_) | None if began => {
+                let side = side();
                 let ruling = side.at_coming(|| beyond_middle(this, around, None), time_s);
                 self.left_room = ruling.is_none() && side.comes(time_s).is_some();
                 let rests_s = time_s + side.rests_in_s();

@@ -28,7 +28,20 @@ const CROSSING_MPS: f64 = 0.5;
 /// How far ahead that crossing is looked for, s. Ours.
 const SOON_S: f64 = 1.0;
 
-/// How the ego vehicle and another lie beside the other's way.
+/// Where the ego vehicle and another are along the other's way and across it.
+#[derive(Debug, Clone, Copy)]
+pub struct Beside {
+    /// As in [`Side`].
+    pub aside_m: f64,
+    apart_m: f64,
+    ego_is_ahead: bool,
+    /// Speeds along the way, m/s: of the ego vehicle and of the other.
+    along_mps: [f64; 2],
+    /// Speeds across the way, each towards the other, m/s.
+    towards_mps: [f64; 2],
+}
+
+/// How the ego vehicle and another lie beside the other's way, and what they do.
 #[derive(Debug, Clone, Copy)]
 pub struct Side {
     /// Gap between the flanks across the way, m; negative if one is before the other.
@@ -50,9 +63,9 @@ pub struct Side {
     pub has_siren: bool,
 }
 
-impl Side {
-    /// `None` if the ego vehicle is nowhere near the other's way. `touch`: whether they touch.
-    pub fn of(vehicle: &Vehicle, touch: bool, around: &Around) -> Option<Side> {
+impl Beside {
+    /// `None` if the ego vehicle is nowhere near the other's way.
+    pub fn of(vehicle: &Vehicle, around: &Around) -> Option<Beside> {
         let this = vehicle.this;
         let here = this.outline.pose.position;
         let map = &around.scene.map;
@@ -80,8 +93,23 @@ impl Side {
             return None;
         }
         let towards = if across_m >= 0.0 { 1.0 } else { -1.0 };
-        let ego_towards_mps = towards * ego.forward.perp(&around.ego_velocity_mps);
-        let other_towards_mps = -towards * other.forward.perp(&this.velocity_mps);
+        Some(Beside {
+            aside_m: across_m.abs() - ego_width_m - other_width_m,
+            apart_m,
+            ego_is_ahead: ego.station_m > other.station_m,
+            along_mps: [ego.forward.dot(&around.ego_velocity_mps), other.forward.dot(&this.velocity_mps)],
+            towards_mps: [
+                towards * ego.forward.perp(&around.ego_velocity_mps),
+                -towards * other.forward.perp(&this.velocity_mps),
+            ],
+        })
+    }
+
+    /// With what the two do. That takes longer to find than where they are. `touch`: whether they touch.
+    pub fn side(&self, vehicle: &Vehicle, touch: bool, around: &Around) -> Side {
+        let Beside { aside_m, apart_m, ego_is_ahead, along_mps: [ego_mps, other_mps], towards_mps } = *self;
+        let (this, map) = (vehicle.this, &around.scene.map);
+        let [ego_towards_mps, other_towards_mps] = towards_mps;
         let ego_does = Conduct {
             outline: around.ego_outline,
             forward: around.ego_forward,
@@ -105,22 +133,23 @@ impl Side {
             touch,
         }
         .rule(map);
-        let ego_mps = ego.forward.dot(&around.ego_velocity_mps);
         let [ego_does, other_does] = turns_off(vehicle, around).unwrap_or([ego_does, other_does]);
-        Some(Side {
-            aside_m: across_m.abs() - ego_width_m - other_width_m,
+        Side {
+            aside_m,
             apart_m,
-            ego_is_ahead: ego.station_m > other.station_m,
+            ego_is_ahead,
             along: around.ego_forward.dot(&this.forward),
             ego_mps,
             allowed_mps: allowed_mps(ego_mps, around),
-            other_mps: other.forward.dot(&this.velocity_mps),
+            other_mps,
             ego_does,
             other_does,
             has_siren: vehicle.has_siren,
-        })
+        }
     }
+}
 
+impl Side {
     /// Whether the two come towards each other. One that backs up does not, which way ever it looks.
     fn is_oncoming(&self) -> bool {
         self.along < -0.5 && ![self.ego_does, self.other_does].contains(&Some(Rule::Backing))
