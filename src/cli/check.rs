@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use avastra_base::outside::Shown;
-use avastra_lang::check::{KnownSpaces, Loaded};
+use avastra_lang::check::Loaded;
 use avastra_lang::model::Space;
 use avastra_lang::syntax::ast::FileId;
 use avastra_lang::syntax::{Diagnostic, apply_fixes};
@@ -23,11 +23,11 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
     let (mut errors, mut warnings) = (0, 0);
     let mut files = Vec::new();
     let (mut unread, mut failed) = (Vec::new(), Vec::new());
-    let (mut known, mut scenes) = (KnownSpaces::default(), Scenes::default());
+    let mut scenes = Scenes::default();
     // What was found of the space of the file before: most often it is that of this one, too.
     let mut warned: Option<(Arc<Space>, Vec<Diagnostic>)> = None;
     for path in &arguments.files {
-        let mut loaded = match load::read_and_check_among(path, &mut known) {
+        let mut loaded = match load::read_and_check(path) {
             Ok(loaded) => loaded,
             Err(failure) => {
                 failed.push(serde_json::json!({ "file": path, "error": failure.to_string() }));
@@ -37,8 +37,8 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
         };
         if arguments.fix && fix(output, path, &loaded)? {
             // Other files may use it.
-            known = KnownSpaces::default();
-            loaded = load::read_and_check_among(path, &mut known)?;
+            load::forget();
+            loaded = load::read_and_check(path)?;
         }
         match (&warned, &loaded.space) {
             (Some((of, found)), Some(space)) if Arc::ptr_eq(of, space) => {

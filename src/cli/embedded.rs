@@ -40,6 +40,7 @@ pub enum Unusable {
 /// # Errors
 /// If it cannot be read, has mistakes, or declares no action.
 pub fn compile(path: &Path) -> Result<Compiled, Unusable> {
+    load::forget();
     let mut loaded = load::read_and_check(path).map_err(|error| Unusable::File(error.to_string()))?;
     let said = |diagnostic| Said {
         record: record(diagnostic, &loaded.sources),

@@ -5,15 +5,15 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
-use std::sync::{Arc, LazyLock, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 
 use avastra_base::outside::Shown;
 use avastra_campaign::run::{self, Asked, Profile, RunError, driving_system};
 use avastra_drivers::external::{Attached, ExternalSettings, Target};
 use avastra_drivers::{EXTERNAL, ModularConfig, REGISTRY};
-use avastra_lang::check::{self, KnownSpaces, Loaded, MapCache, ReadError};
+use avastra_lang::check::{self, KnownSpaces, Loaded, LoadedFile, ReadError};
 use avastra_lang::model::{Policy, Scenario, Space};
-use avastra_lang::syntax::{nearest, yaml_mistake};
+use avastra_lang::syntax::{Sources, nearest, yaml_mistake};
 use avastra_world::action::ActionTable;
 use avastra_world::places::{self, Scenes};
 use avastra_world::sim::TrafficProfile;
@@ -42,8 +42,9 @@ const FILE_BYTES_MAX: u64 = 64 << 20;
 /// Larger sources are refused: the policy of a network with 500,000 weights has 2.7 MiB.
 const SOURCE_BYTES_MAX: u64 = 4 << 20;
 
-/// Maps that this process has read, by name and content: most commands read a space more than once.
-static MAPS: LazyLock<Mutex<MapCache>> = LazyLock::new(Mutex::default);
+/// Spaces that scenarios of this process use, and maps: a suite reads its space once. A command changes no file that others use
+/// after it was read.
+static KNOWN: LazyLock<Mutex<KnownSpaces>> = LazyLock::new(Mutex::default);
 
 /// Reads and checks a file with everything that it uses. Diagnostics are printed.
 ///
@@ -73,9 +74,13 @@ pub fn read_and_check(path: &Path) -> Result<Loaded, Failure> {
     check_read(path, &reader(path))
 }
 
-/// Reads and checks one of many files; reads each space that they share once.
-pub fn read_and_check_among(path: &Path, known: &mut KnownSpaces) -> Result<Loaded, Failure> {
-    judged(path, check::load_among(path, &reader(path), known))
+/// Forgets what was read, for a process in which files may have changed since.
+pub fn forget() {
+    *known() = KnownSpaces::default();
+}
+
+fn known() -> MutexGuard<'static, KnownSpaces> {
+    KNOWN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Reads the file that the user named, and those that it uses.
@@ -94,26 +99,13 @@ pub fn check_text(path: &Path, text: &str) -> Result<Loaded, Failure> {
 }
 
 fn check_read(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, Failure> {
-    judged(path, read_once(path, read))
+    let loaded = check::load_among(path, read, &mut known());
+    judged(path, loaded)
 }
 
-/// Reads a file with everything that it uses, but no map a second time.
-fn read_once(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, ReadError> {
-    let known = || MAPS.lock().unwrap_or_else(PoisonError::into_inner);
-    // A copy, so that threads read at the same time.
-    let mut maps = known().clone();
-    let loaded = check::load_with(path, read, &mut maps);
-    *known() = maps;
-    loaded
-}
-
-/// The files of a space that was read and judged before.
-///
-/// # Errors
-/// As [`load`].
-pub fn files_of(space: &Path) -> Result<Loaded, Failure> {
-    let loaded = read_once(space, &reader(space)).map_err(|error| Failure::file("read", space, error))?;
-    without_mistakes(loaded)
+/// The texts and the files of a space that was checked before.
+pub fn files_of(space: &Path) -> Result<(Sources, Vec<LoadedFile>), Failure> {
+    check::read_files(space, &reader(space)).map_err(|error| Failure::file("read", space, error))
 }
 
 fn judged(path: &Path, loaded: Result<Loaded, ReadError>) -> Result<Loaded, Failure> {

@@ -8,9 +8,9 @@ use std::path::{Component, Path, PathBuf};
 
 use avastra_base::outside::Shown;
 use avastra_campaign::files;
-use avastra_lang::check::{Loaded, LoadedFile, WrittenPath, normal};
+use avastra_lang::check::{Loaded, LoadedFile, WrittenPath, normal, written_paths};
 use avastra_lang::syntax::ast::{Expr, ExprKind, FileId};
-use avastra_lang::syntax::print_expr;
+use avastra_lang::syntax::{Sources, print_expr};
 
 use super::error::Failure;
 use super::files::{make_way, write};
@@ -28,14 +28,16 @@ pub fn pack(output: &Output, files: &[PathBuf], folder: &Path) -> Result<(), Fai
         let loaded = load::load(output, path)?;
         let name = path.file_name().ok_or_else(|| Failure::usage("a file has a name"))?;
         let target = folder.join(name);
-        let mut moves = moves(&loaded, folder)?;
+        let holds_space = loaded.scenario.is_none() && loaded.policy.is_none();
+        let Loaded { sources, files, .. } = loaded;
+        let mut moves = moves(&files, holds_space, folder)?;
         moves.insert(absolute(path)?, target.clone());
         // The recorded answers of an external driving system lie beside their scenario.
         let answers = load::answers_path(path);
         if answers.is_file() {
             moves.insert(absolute(&answers)?, load::answers_path(&target));
         }
-        plan.copy(&loaded, &moves)?;
+        plan.copy(&sources, &files, &moves)?;
         // A file that is named twice is one file.
         if !packed.contains(&target) {
             packed.push(target);
@@ -50,21 +52,24 @@ pub fn pack(output: &Output, files: &[PathBuf], folder: &Path) -> Result<(), Fai
 /// Copies a space with all that it uses into a folder, and returns the path of its copy. Its diagnostics are not printed,
 /// because it was read before.
 pub fn pack_space(space: &Path, folder: &Path) -> Result<PathBuf, Failure> {
-    let loaded = load::files_of(space)?;
+    let (sources, files) = load::files_of(space)?;
     let space = absolute(space)?;
-    let moves = moves(&loaded, folder)?;
+    let moves = moves(&files, true, folder)?;
     let mut plan = Plan::default();
-    plan.copy(&loaded, &moves)?;
+    plan.copy(&sources, &files, &moves)?;
     plan.carry_out(folder, &|| Ok(()))?;
     Ok(moves[&space].clone())
 }
 
 /// Where every file and map goes that a file needs, itself included: below the nearest folder that holds them all.
-fn moves(loaded: &Loaded, folder: &Path) -> Result<BTreeMap<PathBuf, PathBuf>, Failure> {
-    let holds_space = loaded.scenario.is_none() && loaded.policy.is_none();
-    let files = loaded.files.iter().skip(usize::from(!holds_space)).map(|file| file.path.clone());
-    let maps = loaded.written_paths().into_iter().map(|path| path.target);
-    let needed: Vec<PathBuf> = files.chain(maps).map(|path| absolute(&path)).collect::<Result<_, _>>()?;
+fn moves(
+    files: &[LoadedFile],
+    holds_space: bool,
+    folder: &Path,
+) -> Result<BTreeMap<PathBuf, PathBuf>, Failure> {
+    let own = files.iter().skip(usize::from(!holds_space)).map(|file| file.path.clone());
+    let maps = written_paths(files).into_iter().map(|path| path.target);
+    let needed: Vec<PathBuf> = own.chain(maps).map(|path| absolute(&path)).collect::<Result<_, _>>()?;
     let Some(first) = needed.first() else { return Ok(BTreeMap::new()) };
     let mut shared: Vec<Component<'_>> = first.parent().unwrap_or(first).components().collect();
     for path in &needed {
@@ -86,15 +91,20 @@ struct Plan {
 impl Plan {
     /// Adds the files of `moves` at their new places, and in them the new paths of what they use. A file that is there
     /// already must have the same content.
-    fn copy(&mut self, loaded: &Loaded, moves: &BTreeMap<PathBuf, PathBuf>) -> Result<(), Failure> {
-        let paths = loaded.written_paths();
+    fn copy(
+        &mut self,
+        sources: &Sources,
+        files: &[LoadedFile],
+        moves: &BTreeMap<PathBuf, PathBuf>,
+    ) -> Result<(), Failure> {
+        let paths = written_paths(files);
         for (from, to) in moves {
             let is_meant = |file: &LoadedFile| absolute(&file.path).is_ok_and(|path| path == *from);
-            let text = match loaded.files.iter().position(is_meant) {
+            let text = match files.iter().position(is_meant) {
                 Some(index) => {
                     let file = FileId(u32::try_from(index).expect("a file's id is its position"));
                     let own = paths.iter().filter(|path| path.span.file == file);
-                    moved(loaded.sources.text(file), own, to, moves)?
+                    moved(sources.text(file), own, to, moves)?
                 }
                 None => load::text(from)?,
             };

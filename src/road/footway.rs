@@ -96,8 +96,7 @@ impl RoadMap {
 
     /// Distance from a point to the nearest driving lane, m: negative on it, at most 3.
     pub fn lane_room_m(&self, point: Vec2) -> f64 {
-        let ground = self.ground(point);
-        ground.street_m.min(ground.junction_m)
+        self.grid.least_room_m(&self.lanes, point, REACH_M)
     }
 
     /// Whether a vehicle could stand there beside the driving lanes: off them and off crosswalks, and in nothing

@@ -3,7 +3,7 @@
 use core::ops::RangeInclusive;
 use std::collections::{BTreeMap, BTreeSet};
 
-use avastra_base::geometry::{Bounds, Path, Pose, Projection, Vec2, wrap_angle};
+use avastra_base::geometry::{Bounds, Path, Pose, Projection, Vec2, smaller, wrap_angle};
 
 use super::map::{Lane, LaneIndex};
 
@@ -72,6 +72,22 @@ struct Stretch {
     from_m: f64,
     to_m: f64,
     bounds: Bounds,
+}
+
+impl Stretch {
+    /// The nearest point of it, on the centre line of its lane.
+    fn project(&self, centre: &Path, point: Vec2) -> Projection {
+        let (middle_m, half_m) = ((self.from_m + self.to_m) / 2.0, (self.to_m - self.from_m) / 2.0);
+        centre.project_near(point, middle_m, half_m)
+    }
+}
+
+/// The nearest point of stretches of a lane; of several that are as near that of the first.
+fn nearest_of(centre: &Path, stretches: &[(&Stretch, f64)], point: Vec2) -> Projection {
+    let found = stretches.iter().map(|(stretch, _)| stretch.project(centre, point));
+    let nearer =
+        |best: Projection, next: Projection| if next.distance_m < best.distance_m { next } else { best };
+    found.reduce(nearer).expect("there is a stretch")
 }
 
 impl LaneGrid {
@@ -206,14 +222,37 @@ impl LaneGrid {
         ((point.x / self.cell_m).floor() as i64, (point.y / self.cell_m).floor() as i64)
     }
 
+    /// Distance from a point to the nearest edge of a lane, m: negative on the lane, at most `reach_m`.
+    pub fn least_room_m(&self, lanes: &[Lane], point: Vec2, reach_m: f64) -> f64 {
+        let room_m = |lane: LaneIndex, found: Projection| {
+            found.distance_m - lanes[lane.0].width_at(found.station_m) / 2.0
+        };
+        let Some(mut stretches) = self.stretches(point, reach_m) else {
+            let found = self.near(lanes, point, reach_m).into_iter();
+            return found.map(|(lane, found)| room_m(lane, found)).fold(reach_m, f64::min);
+        };
+        stretches.sort_by_key(|(stretch, _)| stretch.lane);
+        let nearest_m2 =
+            |lane: &[(&Stretch, f64)]| lane.iter().map(|part| part.1).fold(f64::INFINITY, smaller);
+        let mut by_lane: Vec<_> = stretches.chunk_by(|(a, _), (b, _)| a.lane == b.lane).collect();
+        by_lane.sort_by(|a, b| nearest_m2(a).total_cmp(&nearest_m2(b)));
+        let mut least_m = reach_m;
+        for parts in by_lane {
+            // From here on every lane is farther away.
+            if nearest_m2(parts).sqrt() - SLACK_M - self.half_width_m > least_m {
+                break;
+            }
+            let found = nearest_of(&lanes[parts[0].0.lane.0].centre, parts, point);
+            least_m = least_m.min(room_m(parts[0].0.lane, found));
+        }
+        least_m
+    }
+
     /// The nearest point of each lane whose centre comes within `reach_m` and half a lane width of a
     /// point, by rising index; a few lanes that are farther away may be among them.
     pub fn near(&self, lanes: &[Lane], point: Vec2, reach_m: f64) -> Vec<(LaneIndex, Projection)> {
-        let radius_m = reach_m.max(0.0) + self.half_width_m;
-        let margin = Vec2::new(radius_m, radius_m);
-        let (low, high) = (self.cell(point - margin), self.cell(point + margin));
-        let cells = (high.0 - low.0 + 1).saturating_mul(high.1 - low.1 + 1);
-        if cells > CELLS_MAX {
+        let Some(stretches) = self.stretches(point, reach_m) else {
+            let radius_m = self.radius_m(reach_m);
             let in_reach = lanes.iter().zip(&self.boxes).enumerate().filter_map(|(index, (lane, bounds))| {
                 if bounds.distance_m2_min(point) > radius_m * radius_m {
                     return None;
@@ -222,23 +261,42 @@ impl LaneGrid {
                 (projection.distance_m <= radius_m).then_some((LaneIndex(index), projection))
             });
             return in_reach.collect();
-        }
+        };
         let mut found: Vec<(LaneIndex, Projection)> = Vec::new();
-        for x in low.0..=high.0 {
-            for stretch in self.cells.range((x, low.1)..=(x, high.1)).flat_map(|(_, stretches)| stretches) {
-                if stretch.bounds.distance_m2_min(point) > radius_m * radius_m {
-                    continue;
-                }
-                let (middle_m, half_m) =
-                    ((stretch.from_m + stretch.to_m) / 2.0, (stretch.to_m - stretch.from_m) / 2.0);
-                let projection = lanes[stretch.lane.0].centre.project_near(point, middle_m, half_m);
-                match found.binary_search_by_key(&stretch.lane, |(lane, _)| *lane) {
-                    Ok(at) if projection.distance_m < found[at].1.distance_m => found[at].1 = projection,
-                    Ok(_) => {}
-                    Err(at) => found.insert(at, (stretch.lane, projection)),
-                }
+        for (stretch, _) in stretches {
+            let projection = stretch.project(&lanes[stretch.lane.0].centre, point);
+            match found.binary_search_by_key(&stretch.lane, |(lane, _)| *lane) {
+                Ok(at) if projection.distance_m < found[at].1.distance_m => found[at].1 = projection,
+                Ok(_) => {}
+                Err(at) => found.insert(at, (stretch.lane, projection)),
             }
         }
         found
+    }
+
+    /// Stretches of lanes that may come within `reach_m` and half a lane width of a point, each with the square of a distance
+    /// that none of its places undercuts, m². `None` if nearly all of them may.
+    fn stretches(&self, point: Vec2, reach_m: f64) -> Option<Vec<(&Stretch, f64)>> {
+        let radius_m = self.radius_m(reach_m);
+        let margin = Vec2::new(radius_m, radius_m);
+        let (low, high) = (self.cell(point - margin), self.cell(point + margin));
+        let cells = (high.0 - low.0 + 1).saturating_mul(high.1 - low.1 + 1);
+        if cells > CELLS_MAX {
+            return None;
+        }
+        let mut found = Vec::new();
+        for x in low.0..=high.0 {
+            for stretch in self.cells.range((x, low.1)..=(x, high.1)).flat_map(|(_, stretches)| stretches) {
+                let least_m2 = stretch.bounds.distance_m2_min(point);
+                if least_m2 <= radius_m * radius_m {
+                    found.push((stretch, least_m2));
+                }
+            }
+        }
+        Some(found)
+    }
+
+    fn radius_m(&self, reach_m: f64) -> f64 {
+        reach_m.max(0.0) + self.half_width_m
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use avastra::action::ActionTable;
 use avastra::check::Loaded;
-use avastra::episode::{Breach, EpisodeLog};
+use avastra::episode::{Breach, EpisodeLog, Script, run_with_margins};
 use avastra::geometry::{OrientedBox, distance_m};
 use avastra::model::Claim;
 use avastra::model::vocabulary::{Body, Light};
@@ -156,8 +156,10 @@ fn the_margins_over_time_reach_down_to_the_smallest_one() {
         let run = run_against("idm", space_at(space), 3, 5, &[]);
         let requirements = run.space().requirements.clone();
         for number in 0..run.episodes() {
-            let log = run.episode(number);
-            for series in avastra::episode::margins_over_time(&run.setup(number), &log) {
+            let script = Script::of_log(&run.episode(number));
+            let setup = run.setup(number);
+            let log = run_with_margins(&setup, &mut |moment| script.choose(moment), &mut |_, _, _| {});
+            for series in &log.series {
                 let required = &requirements[series.requirement];
                 let told = log.margins.iter().find(|one| one.requirement == series.requirement);
                 let told = told.expect("what is asked has a margin").smallest;

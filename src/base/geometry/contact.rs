@@ -11,6 +11,9 @@ use super::pose::{OrientedBox, Pose, Vec2, extent_m, wrap_angle};
 /// closes with at least a millimetre a second.
 const CONTACT_M: f64 = 1e-6;
 
+/// Circles around boxes pass each other with so much between them, m: far more than rounding.
+const PASSING_M: f64 = 1e-3;
+
 /// The gap between two boxes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Clearance {
@@ -122,6 +125,13 @@ pub fn first_contact(a: &Sweep, b: &Sweep) -> Option<FirstContact> {
     // Broad phase: circles around the boxes do not meet. They are a little too large, and need no root.
     let reach_m = a.reach_m() + b.reach_m() + approach.x.abs() + approach.y.abs() + CONTACT_M;
     if between.norm_squared() > reach_m * reach_m {
+        return None;
+    }
+    // Circles around the boxes pass each other: each stays around its box, however that turns.
+    let way_m2 = approach.norm_squared();
+    let nearest = if way_m2 > 0.0 { (between.dot(&approach) / way_m2).clamp(0.0, 1.0) } else { 0.0 };
+    let radii_m = a.start.radius_m() + b.start.radius_m() + PASSING_M;
+    if (between - approach * nearest).norm_squared() > radii_m * radii_m {
         return None;
     }
     let turning_m = a.turning_m() + b.turning_m();

@@ -10,6 +10,7 @@ use avastra_world::sim::{Contact, DT_S, Incident, Obstacle, Trace, World};
 
 use super::facts::collision_facts;
 use super::log::{Collision, Held};
+use super::margins::MarginSeries;
 use super::monitor::{Breach, Margin, Monitor};
 use super::setup::Setup;
 use super::trails::Trails;
@@ -34,6 +35,7 @@ pub(super) struct Records {
     pub incidents: Vec<Incident>,
     pub breaches: Vec<Breach>,
     pub margins: Vec<Margin>,
+    pub series: Vec<MarginSeries>,
     pub distance_m: f64,
 }
 
@@ -47,6 +49,8 @@ pub(super) struct Chronicle {
     monitor: Option<Monitor>,
     trails: Trails,
     // Records alone.
+    /// Kept if it was asked for.
+    series: Vec<MarginSeries>,
     held: Vec<Held>,
     incidents: Vec<Incident>,
     trace: Trace,
@@ -60,6 +64,7 @@ impl Chronicle {
         trails.note(world);
         Chronicle {
             held: Vec::new(),
+            series: Vec::new(),
             own_bodies: BTreeMap::new(),
             collisions: Vec::new(),
             incidents: Vec::new(),
@@ -68,6 +73,12 @@ impl Chronicle {
             trace: Trace::default(),
             distance_m: 0.0,
         }
+    }
+
+    /// From now on the margins of each tick are kept, too.
+    pub fn keep_series(&mut self, setup: &Setup) {
+        let asked = |monitor| MarginSeries::of_asked(monitor, setup.table.space());
+        self.series = self.monitor.as_ref().map(asked).unwrap_or_default();
     }
 
     /// An effect has made road users appear, the first of whom has this number.
@@ -101,9 +112,9 @@ impl Chronicle {
     }
 
     pub fn into_records(self) -> Records {
-        let Chronicle { held, collisions, incidents, monitor, distance_m, .. } = self;
+        let Chronicle { held, collisions, incidents, monitor, series, distance_m, .. } = self;
         let (breaches, margins) = monitor.map_or_else(Default::default, Monitor::found);
-        Records { held, collisions, incidents, breaches, margins, distance_m }
+        Records { held, collisions, incidents, breaches, margins, series, distance_m }
     }
 
     /// What the driving system answered, before the world moves.
@@ -125,6 +136,9 @@ impl Chronicle {
         self.trails.note(world);
         if let Some(monitor) = self.monitor.as_mut().filter(|_| is_whole) {
             monitor.judge(setup, (world, &self.own_bodies), memory, step);
+            if contacts.is_empty() {
+                self.series.iter_mut().for_each(|series| series.note(monitor));
+            }
         }
         self.distance_m += world.ego().speed_mps * DT_S;
         world.trace(&mut self.trace);

@@ -11,6 +11,7 @@ use avastra_search::mdp::{PerceptionCounts, StateVector};
 use avastra_world::action::{Draw, Effect};
 use avastra_world::sim::{Contact, Incident, Start};
 
+use super::margins::MarginSeries;
 use super::monitor::{Breach, Margin};
 use super::precrash::PreCrash;
 use super::shape::Shape;
@@ -40,6 +41,8 @@ pub struct EpisodeLog {
     pub breaches: Vec<Breach>,
     /// For each requirement in force.
     pub margins: Vec<Margin>,
+    /// Their margins tick by tick, if they were asked for.
+    pub series: Vec<MarginSeries>,
     pub end: End,
     pub duration_s: f64,
     /// Distance driven by the ego vehicle, m.

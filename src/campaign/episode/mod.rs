@@ -19,11 +19,11 @@ mod trails;
 
 pub use facts::{at_fault, collision_facts, run_into_from_behind, side, struck};
 pub use log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
-pub use margins::{MarginSeries, margins_over_time};
+pub use margins::MarginSeries;
 pub use monitor::{Breach, Margin};
 pub use precrash::PreCrash;
 pub use recorder::{Actor, Lights, Phase, Recorder, Sample, Sky, Touch};
-pub use run::{Choice, Moment, Play, Watch, run, run_from, run_watched};
+pub use run::{Choice, Moment, Play, Watch, run, run_from, run_watched, run_with_margins};
 pub use script::{Script, ScriptedAction};
 pub use setup::Setup;
 pub use shape::Shape;

@@ -113,6 +113,17 @@ pub fn run_watched(
     run_from(Play::new(setup), choose, watch, &mut |_| {})
 }
 
+/// As [`run_watched`]; the log has the margins of each tick.
+pub fn run_with_margins(
+    setup: &Setup,
+    choose: &mut dyn FnMut(&Moment) -> Choice,
+    watch: &mut Watch,
+) -> EpisodeLog {
+    let mut play = Play::new(setup);
+    play.chronicle.keep_series(setup);
+    run_from(play, choose, watch, &mut |_| {})
+}
+
 /// As [`run_watched`], but from `play`, the start of an episode or a kept moment of one. The log covers the whole episode.
 /// `last` gets the moment at which the next choice would have been due.
 pub fn run_from(
@@ -447,7 +458,7 @@ impl Play {
     /// The log of the episode, which ended so.
     pub fn into_log(self, end: End) -> EpisodeLog {
         let setup = &self.setup;
-        let Records { held, collisions, incidents, breaches, margins, distance_m } =
+        let Records { held, collisions, incidents, breaches, margins, series, distance_m } =
             self.chronicle.into_records();
         EpisodeLog {
             road: setup.road().name.clone(),
@@ -462,6 +473,7 @@ impl Play {
             incidents,
             breaches,
             margins,
+            series,
             end,
             duration_s: self.world.time_s(),
             distance_m,

@@ -166,7 +166,7 @@ fn played(
         }
         script.choose(moment)
     };
-    let log = episode::run_watched(&setup, &mut choose, &mut |world, ads, contacts| {
+    let log = episode::run_with_margins(&setup, &mut choose, &mut |world, ads, contacts| {
         recorder.note(world, ads, contacts);
         mind.note(world, ads, contacts);
         gauges.note(world, contacts);
@@ -201,7 +201,7 @@ fn played(
         "held": log.held.iter().map(|held| json!([held.from_s, held.text(), held.restraint()])).collect::<Vec<_>>(),
         "ego": ego(&recorder.ego, &mind, &mut columns), "obstacles": obstacles(table, &log, &recorder, &mut columns),
         "tracks": mind.tracks(&mut columns), "plans": mind.plans(&mut columns),
-        "margins": margins(table, &log, &episode::margins_over_time(&setup, &log), &mut columns),
+        "margins": margins(table, &log, &log.series, &mut columns),
         "signals": signals(&recorder), "skies": recorder.skies.iter().map(sky).collect::<Vec<_>>(),
     });
     let main = counted.first().copied().or((!log.collisions.is_empty()).then_some(0));

@@ -57,17 +57,22 @@ pub struct WrittenPath {
 impl Loaded {
     /// The paths that are written in the files.
     pub fn written_paths(&self) -> Vec<WrittenPath> {
-        let mut found = Vec::new();
-        for file in &self.files {
-            let used = uses(file).map(|used| (used.path.value.as_str(), used.path.span));
-            found.extend(used.chain(maps_named(file)).map(|(written, span)| WrittenPath {
-                span,
-                written: written.to_owned(),
-                target: path_from(file, written),
-            }));
-        }
-        found
+        written_paths(&self.files)
     }
+}
+
+/// The paths that are written in files.
+pub fn written_paths(files: &[LoadedFile]) -> Vec<WrittenPath> {
+    let mut found = Vec::new();
+    for file in files {
+        let used = uses(file).map(|used| (used.path.value.as_str(), used.path.span));
+        found.extend(used.chain(maps_named(file)).map(|(written, span)| WrittenPath {
+            span,
+            written: written.to_owned(),
+            target: path_from(file, written),
+        }));
+    }
+    found
 }
 
 /// Maps that were read before, by name and content, and the routes found on them. A caller that loads often, such as the
@@ -245,6 +250,14 @@ fn as_many_as_help(mut found: Vec<Diagnostic>) -> Vec<Diagnostic> {
         found.push(Diagnostic { severity: worst.severity, ..Diagnostic::error(worst.code, message) });
     }
     found
+}
+
+/// The texts and the files of a root and of all that it uses, as in [`Loaded`]. Nothing is checked.
+///
+/// # Errors
+/// As [`load`].
+pub fn read_files(root: &Path, read: &ReadFile<'_>) -> Result<(Sources, Vec<LoadedFile>), ReadError> {
+    Loader::read(root, read, None).map(|loader| (loader.sources, loader.files))
 }
 
 /// The files that a file uses, itself included, however far away. Nothing is checked.

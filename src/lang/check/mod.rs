@@ -56,7 +56,10 @@ mod unused;
 pub use checker::{Claim, Runs};
 pub use difference::{Change, Difference, differences};
 pub use files::{LoadedFile, ReadError, ReadFile, normal};
-pub use load::{KnownSpaces, Loaded, MapCache, WrittenPath, files_used, load, load_among, load_with};
+pub use load::{
+    KnownSpaces, Loaded, MapCache, WrittenPath, files_used, load, load_among, load_with, read_files,
+    written_paths,
+};
 pub use missing_use::suggest_uses;
 pub use references::{Declaration, Occurrence, References, Symbol};
 
