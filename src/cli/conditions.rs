@@ -1,6 +1,6 @@
 //! The settings of episodes that a command line asks for: who drives, where, under which conditions.
 
-use avastra_campaign::run::{Profile, RunSettings, TrafficRecord};
+use avastra_campaign::run::{Profile, Run, RunSettings, TrafficRecord};
 use avastra_lang::model::Space;
 
 use super::arguments::ConditionArguments;
@@ -27,6 +27,17 @@ pub fn settings(
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
         ..RunSettings::new(space, agent, episodes, arguments.seed)
+    })
+}
+
+/// On which roads fewer vehicles of ambient traffic are there at the start than were asked for; nothing if all are.
+pub fn ambient_text(run: &Run) -> Option<String> {
+    let wanted = run.settings().ambient;
+    let lacking = run.ambient_at_start().into_iter().filter(|(_, found)| *found < wanted);
+    let roads: Vec<String> = lacking.map(|(road, found)| format!("{found} on {road}")).collect();
+    (!roads.is_empty()).then(|| {
+        let roads = roads.join(", ");
+        format!("of {wanted} vehicles of ambient traffic, at the start there are {roads}; more come where there is room")
     })
 }
 

@@ -99,6 +99,7 @@ fn play_all(
     directory.restore(output)?;
     let share = Share::of(&path, estimate.settings())?;
     output.tell(&format!("{}, into {}", heading(&estimate), path.shown()));
+    conditions::ambient_text(estimate.run()).iter().for_each(|text| output.tell(text));
     let jobs = jobs(asked_jobs, estimate.run().arena().program())?;
     let Some(pilot) = piloted(output, &estimate, &mut directory, jobs, &stop)? else {
         return share.end(output, directory, false, None);

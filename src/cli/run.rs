@@ -91,6 +91,7 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     };
     let Some(((run, directory), elsewhere)) = begun else { return Ok(()) };
     output.tell(&format!("{}, into {}", heading(&run), directory.path.shown()));
+    conditions::ambient_text(&run).iter().for_each(|text| output.tell(text));
     elsewhere.iter().for_each(|text| output.warn(text));
     let found = play_all(output, (run, directory), elsewhere, arguments.jobs)?;
     if arguments.fail_on_collision && found.counted > 0 {

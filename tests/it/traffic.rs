@@ -87,3 +87,28 @@ fn unknown_names_and_bad_files_are_refused() {
         assert!(told.contains(message), "{told}");
     }
 }
+
+/// Up to 100 may be asked for; a run says how many there are at the start.
+#[test]
+fn a_run_says_how_many_ambient_vehicles_there_are() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let told = |vehicles: &str| {
+        let more = ["--ambient", vehicles, "--agent", "none", "--episodes", "1", "--ads", "idm"];
+        let arguments = ["run", SPACE, "--road", "corner", "--seed", "11", "--out"];
+        let directory = scratch.path().join(vehicles).display().to_string();
+        let (status, stdout, stderr) =
+            outcome(&mut avastra(&[&arguments[..], &[&directory], &more].concat()));
+        assert_eq!(status, 0, "{stdout}{stderr}");
+        stdout + &stderr
+    };
+    let many = told("100");
+    let line =
+        many.lines().find(|line| line.starts_with("of 100 vehicles of ambient traffic")).expect("it is told");
+    let (_, found) = line.split_once("at the start there are ").expect("it counts them");
+    let found: u32 = found.split(' ').next().and_then(|text| text.parse().ok()).expect("a number");
+    assert!((10..100).contains(&found), "{line}");
+    assert!(!told("0").contains("ambient traffic"), "none are asked for");
+    let more = ["--ambient", "101"];
+    let (status, _, stderr) = run(&scratch.path().join("more"), &more);
+    assert!(status == 1 && stderr.contains("101 is not in 0..=100"), "{status}: {stderr}");
+}

@@ -482,6 +482,10 @@ impl Path {
 
 /// The heading at a fraction of the segment between two vertices, rad.
 fn heading_between(a: &PathPoint, b: &PathPoint, fraction: f64) -> f64 {
+    // Most segments are straight.
+    if a.heading_rad == b.heading_rad {
+        return wrap_angle(a.heading_rad);
+    }
     let turn_rad = wrap_angle(b.heading_rad - a.heading_rad) * fraction.clamp(0.0, 1.0);
     wrap_angle(a.heading_rad + turn_rad)
 }

@@ -15,6 +15,7 @@ use avastra_base::rng::Stream;
 use avastra_lang::model::Space;
 use avastra_search::agent::{Agent, Kind, QPolicy};
 use avastra_world::action::ActionTable;
+use avastra_world::sim::World;
 
 use crate::run::arena::{Arena, Offers, choose};
 use crate::run::gauges::Gauges;
@@ -184,6 +185,18 @@ impl Run {
         let mut setup = self.arena.setup(road, seed);
         setup.start.ambient = self.settings.ambient;
         setup
+    }
+
+    /// How many vehicles of ambient traffic there is room for at the beginning of the first episode on each road, by its name.
+    pub fn ambient_at_start(&self) -> Vec<(String, u32)> {
+        let first = (0..self.episodes()).step_by(self.settings.episodes.max(1) as usize);
+        let found = first.map(|number| {
+            let setup = self.setup(number);
+            let world = World::new(Arc::clone(&setup.scene), &setup.start);
+            let ambient = world.obstacles().filter(|obstacle| obstacle.is_ambient()).count();
+            (setup.road().name.clone(), ambient as u32)
+        });
+        found.collect()
     }
 
     /// A fresh agent for one episode.

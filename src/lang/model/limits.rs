@@ -58,7 +58,7 @@ pub const SIGNAL_PHASE_S: RangeInclusive<f64> = 0.0..=3600.0;
 pub const START_MPS: f64 = 3.0;
 
 /// Most ambient vehicles around the ego vehicle.
-pub const AMBIENT_MAX: u32 = 20;
+pub const AMBIENT_MAX: u32 = 100;
 
 /// Most road users at a time that actions made appear (published package).
 pub const COMMANDED_MAX: u32 = 10;

@@ -5,11 +5,16 @@
 //! of it, with its errors and delays, is `ads`.
 
 use avastra_base::geometry::{Frame, OrientedBox, Vec2, larger};
+use avastra_lang::model::{AMBIENT_MAX, COMMANDED_MAX};
 
 use crate::state::obstacle::Obstacle;
 
 /// Points of an outline to which a line of sight is tried.
 const RAYS: usize = 8;
+
+/// As many road users as there may be, and the vehicles that are parked with them.
+const HIDERS_MAX: usize = u128::BITS as usize;
+const _: () = assert!((AMBIENT_MAX + COMMANDED_MAX) as usize <= HIDERS_MAX);
 
 /// Part of an obstacle's outline that can be seen from a point, in `[0, 1]`.
 ///
@@ -27,11 +32,11 @@ pub fn visible_fraction<'a>(
         return 1.0;
     }
     // One bit for each obstacle that may stand in the way; most often there is none.
-    let mut hiders = 0_u32;
+    let mut hiders = 0_u128;
     let radius_m = target.outline.radius_m();
-    for (index, other) in obstacles.clone().take(u32::BITS as usize).enumerate() {
+    for (index, other) in obstacles.clone().take(HIDERS_MAX).enumerate() {
         let hides = other.id != target.id && may_hide(eye, towards, distance_m, radius_m, &other.outline);
-        hiders |= u32::from(hides) << index;
+        hiders |= u128::from(hides) << index;
     }
     if hiders == 0 {
         return 1.0;
