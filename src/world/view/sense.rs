@@ -5,16 +5,11 @@
 //! of it, with its errors and delays, is `ads`.
 
 use avastra_base::geometry::{Frame, OrientedBox, Vec2, larger};
-use avastra_lang::model::{AMBIENT_MAX, COMMANDED_MAX};
 
 use crate::state::obstacle::Obstacle;
 
 /// Points of an outline to which a line of sight is tried.
 const RAYS: usize = 8;
-
-/// As many road users as there may be, and the vehicles that are parked with them.
-const HIDERS_MAX: usize = u128::BITS as usize;
-const _: () = assert!((AMBIENT_MAX + COMMANDED_MAX) as usize <= HIDERS_MAX);
 
 /// Part of an obstacle's outline that can be seen from a point, in `[0, 1]`.
 ///
@@ -24,21 +19,20 @@ const _: () = assert!((AMBIENT_MAX + COMMANDED_MAX) as usize <= HIDERS_MAX);
 pub fn visible_fraction<'a>(
     eye: Vec2,
     target: &Obstacle,
-    obstacles: impl Iterator<Item = &'a Obstacle> + Clone,
+    obstacles: impl Iterator<Item = &'a Obstacle>,
 ) -> f64 {
     let towards = target.outline.pose.position - eye;
     let distance_m = towards.norm();
     if distance_m < 1e-6 {
         return 1.0;
     }
-    // One bit for each obstacle that may stand in the way; most often there is none.
-    let mut hiders = 0_u128;
     let radius_m = target.outline.radius_m();
-    for (index, other) in obstacles.clone().take(HIDERS_MAX).enumerate() {
-        let hides = other.id != target.id && may_hide(eye, towards, distance_m, radius_m, &other.outline);
-        hiders |= u128::from(hides) << index;
-    }
-    if hiders == 0 {
+    // Most often nobody stands in the way.
+    let hides = |other: &&Obstacle| {
+        other.id != target.id && may_hide(eye, towards, distance_m, radius_m, &other.outline)
+    };
+    let hiders: Vec<&Obstacle> = obstacles.filter(hides).collect();
+    if hiders.is_empty() {
         return 1.0;
     }
     let (first, last) = silhouette(eye, towards, target);
@@ -48,7 +42,7 @@ pub fn visible_fraction<'a>(
         ((point - eye) / reach_m.max(1e-6), reach_m)
     });
     let mut shown = [1.0_f64; RAYS];
-    for (_, other) in obstacles.enumerate().filter(|(index, _)| hiders >> index & 1 == 1) {
+    for other in hiders {
         let above = (1.0 - other.height_m / target.height_m).max(0.0);
         let other = Frame::along(&other.outline, other.forward);
         for ((direction, reach_m), shown) in rays.iter().zip(&mut shown) {
