@@ -33,6 +33,9 @@ pub fn settings(
 /// On which roads fewer vehicles of ambient traffic are there at the start than were asked for; nothing if all are.
 pub fn ambient_text(run: &Run) -> Option<String> {
     let wanted = run.settings().ambient;
+    if wanted == 0 {
+        return None;
+    }
     let lacking = run.ambient_at_start().into_iter().filter(|(_, found)| *found < wanted);
     let roads: Vec<String> = lacking.map(|(road, found)| format!("{found} on {road}")).collect();
     (!roads.is_empty()).then(|| {

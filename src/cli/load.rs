@@ -1,11 +1,12 @@
 //! Loads files for the commands: each is read, checked and its diagnostics printed; a command gets a table, a
 //! scenario, a policy or a profile, or an error.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
-use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use avastra_base::outside::Shown;
 use avastra_campaign::run::{self, Asked, Profile, RunError, driving_system};
@@ -42,9 +43,11 @@ const FILE_BYTES_MAX: u64 = 64 << 20;
 /// Larger sources are refused: the policy of a network with 500,000 weights has 2.7 MiB.
 const SOURCE_BYTES_MAX: u64 = 4 << 20;
 
-/// Spaces that scenarios of this process use, and maps: a suite reads its space once. A command changes no file that others use
-/// after it was read.
-static KNOWN: LazyLock<Mutex<KnownSpaces>> = LazyLock::new(Mutex::default);
+thread_local! {
+    /// Spaces that scenarios use, and maps: each thread reads the space of a suite once. A command that changes a file which others use
+    /// calls [`forget`].
+    static KNOWN: RefCell<KnownSpaces> = RefCell::default();
+}
 
 /// Reads and checks a file with everything that it uses. Diagnostics are printed.
 ///
@@ -74,13 +77,9 @@ pub fn read_and_check(path: &Path) -> Result<Loaded, Failure> {
     check_read(path, &reader(path))
 }
 
-/// Forgets what was read, for a process in which files may have changed since.
+/// Forgets what this thread has read: files may have changed since.
 pub fn forget() {
-    *known() = KnownSpaces::default();
-}
-
-fn known() -> MutexGuard<'static, KnownSpaces> {
-    KNOWN.lock().unwrap_or_else(PoisonError::into_inner)
+    KNOWN.take();
 }
 
 /// Reads the file that the user named, and those that it uses.
@@ -99,7 +98,7 @@ pub fn check_text(path: &Path, text: &str) -> Result<Loaded, Failure> {
 }
 
 fn check_read(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, Failure> {
-    let loaded = check::load_among(path, read, &mut known());
+    let loaded = KNOWN.with_borrow_mut(|known| check::load_among(path, read, known));
     judged(path, loaded)
 }
 

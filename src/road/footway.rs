@@ -238,3 +238,30 @@ fn distance_m2(point: Vec2, a: Vec2, b: Vec2) -> f64 {
     let part = ((point - a).dot(&side) / side.norm_squared().max(1e-12)).clamp(0.0, 1.0);
     (point - a - side * part).norm_squared()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The nearest edge is found without looking at lanes that are farther away.
+    #[test]
+    fn the_nearest_lane_edge_is_that_of_a_look_at_all_lanes() {
+        let (mut on, mut off) = (0, 0);
+        for name in ["crossroad", "corner"] {
+            let path = format!("{}/../../scenarios/roads/{name}.xodr", env!("CARGO_MANIFEST_DIR"));
+            let map = RoadMap::from_opendrive(name, &std::fs::read_to_string(path).unwrap()).unwrap();
+            for nth in 0..4000_u32 {
+                let lane = &map.lanes[nth as usize % map.lanes.len()].centre;
+                let part = |factor: f64| (f64::from(nth) * factor).fract();
+                let pose = lane.pose_at(part(0.618) * lane.length_m());
+                let point = pose.offset(0.0, 24.0 * part(0.414) - 12.0).position;
+                let ground = map.ground(point);
+                let room_m = map.lane_room_m(point);
+                assert_eq!(room_m, ground.street_m.min(ground.junction_m), "{point:?} on {name}");
+                on += u32::from(room_m < 0.0);
+                off += u32::from(room_m > 0.0 && room_m < REACH_M);
+            }
+        }
+        assert!(on > 1000 && off > 500, "{on} on lanes, {off} beside them");
+    }
+}

@@ -82,6 +82,10 @@ impl Stretch {
     }
 }
 
+fn of_one_lane((a, _): &(&Stretch, f64), (b, _): &(&Stretch, f64)) -> bool {
+    a.lane == b.lane
+}
+
 /// The nearest point of stretches of a lane; of several that are as near that of the first.
 fn nearest_of(centre: &Path, stretches: &[(&Stretch, f64)], point: Vec2) -> Projection {
     let found = stretches.iter().map(|(stretch, _)| stretch.project(centre, point));
@@ -227,14 +231,13 @@ impl LaneGrid {
         let room_m = |lane: LaneIndex, found: Projection| {
             found.distance_m - lanes[lane.0].width_at(found.station_m) / 2.0
         };
-        let Some(mut stretches) = self.stretches(point, reach_m) else {
+        let Some(stretches) = self.stretches(point, reach_m) else {
             let found = self.near(lanes, point, reach_m).into_iter();
             return found.map(|(lane, found)| room_m(lane, found)).fold(reach_m, f64::min);
         };
-        stretches.sort_by_key(|(stretch, _)| stretch.lane);
         let nearest_m2 =
             |lane: &[(&Stretch, f64)]| lane.iter().map(|part| part.1).fold(f64::INFINITY, smaller);
-        let mut by_lane: Vec<_> = stretches.chunk_by(|(a, _), (b, _)| a.lane == b.lane).collect();
+        let mut by_lane: Vec<_> = stretches.chunk_by(of_one_lane).collect();
         by_lane.sort_by(|a, b| nearest_m2(a).total_cmp(&nearest_m2(b)));
         let mut least_m = reach_m;
         for parts in by_lane {
@@ -262,20 +265,15 @@ impl LaneGrid {
             });
             return in_reach.collect();
         };
-        let mut found: Vec<(LaneIndex, Projection)> = Vec::new();
-        for (stretch, _) in stretches {
-            let projection = stretch.project(&lanes[stretch.lane.0].centre, point);
-            match found.binary_search_by_key(&stretch.lane, |(lane, _)| *lane) {
-                Ok(at) if projection.distance_m < found[at].1.distance_m => found[at].1 = projection,
-                Ok(_) => {}
-                Err(at) => found.insert(at, (stretch.lane, projection)),
-            }
-        }
-        found
+        let place = |parts: &[(&Stretch, f64)]| {
+            let lane = parts[0].0.lane;
+            (lane, nearest_of(&lanes[lane.0].centre, parts, point))
+        };
+        stretches.chunk_by(of_one_lane).map(place).collect()
     }
 
     /// Stretches of lanes that may come within `reach_m` and half a lane width of a point, each with the square of a distance
-    /// that none of its places undercuts, m². `None` if nearly all of them may.
+    /// that none of its places undercuts, m², by rising lane. `None` if nearly all of them may.
     fn stretches(&self, point: Vec2, reach_m: f64) -> Option<Vec<(&Stretch, f64)>> {
         let radius_m = self.radius_m(reach_m);
         let margin = Vec2::new(radius_m, radius_m);
@@ -284,7 +282,7 @@ impl LaneGrid {
         if cells > CELLS_MAX {
             return None;
         }
-        let mut found = Vec::new();
+        let mut found: Vec<(&Stretch, f64)> = Vec::new();
         for x in low.0..=high.0 {
             for stretch in self.cells.range((x, low.1)..=(x, high.1)).flat_map(|(_, stretches)| stretches) {
                 let least_m2 = stretch.bounds.distance_m2_min(point);
@@ -293,6 +291,7 @@ impl LaneGrid {
                 }
             }
         }
+        found.sort_by_key(|(stretch, _)| stretch.lane);
         Some(found)
     }
 

@@ -187,11 +187,12 @@ impl Run {
         setup
     }
 
-    /// How many vehicles of ambient traffic there is room for at the beginning of the first episode on each road, by its name.
+    /// How many vehicles of ambient traffic are there at the beginning of an episode on each road, by its name.
     pub fn ambient_at_start(&self) -> Vec<(String, u32)> {
-        let first = (0..self.episodes()).step_by(self.settings.episodes.max(1) as usize);
-        let found = first.map(|number| {
-            let setup = self.setup(number);
+        let found = (0..self.settings.roads.len()).map(|road| {
+            let first = road * self.settings.episodes as usize;
+            let seed = rng::child_seed(self.settings.seed, Stream::Episode, first as u64);
+            let setup = self.setup_of(road, seed);
             let world = World::new(Arc::clone(&setup.scene), &setup.start);
             let ambient = world.obstacles().filter(|obstacle| obstacle.is_ambient()).count();
             (setup.road().name.clone(), ambient as u32)

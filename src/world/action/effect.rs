@@ -67,7 +67,7 @@ pub struct SpawnRequest {
     pub then: Then,
     /// Cruising speed, m/s.
     pub speed_mps: f64,
-    /// Gap to the ego vehicle along its route, m; behind the ego vehicle for `Overtake`. `place`
+    /// Gap to the ego vehicle along its route, m; behind the ego vehicle for `Overtake`. `world::place`
     /// says for each verb what exactly lies at that distance.
     pub distance_m: f64,
     /// The author's own body that is meant, in place of `body` and of `cover`.

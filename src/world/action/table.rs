@@ -106,7 +106,7 @@ impl ActionTable {
         &self.space.rows
     }
 
-    /// How often each row is drawn by chance: by `odds actions`, or else [balanced](ActionTable::balanced).
+    /// How often each row is drawn by chance: by `odds actions`, or else balanced.
     pub fn odds(&self, situation: &Situation<'_>) -> Vec<RowOdds> {
         let Situation { memory, road, .. } = *situation;
         let space = &self.space;

@@ -1,5 +1,4 @@
-//! A road user other than the ego vehicle: what others may see of it (`Obstacle`), and what moves it
-//! (`Mover`): a driver, two legs, or nothing.
+//! What a tick and an order do with a road user, whatever moves it: a driver, two legs, a trajectory or nothing.
 
 use std::sync::Arc;
 

@@ -7,7 +7,7 @@
 //! commanded traffic draws the same with and without them. They drive at 80 to 100 % of each lane's limit,
 //! change lanes where they gain by it (`npc::mobil`), turn as drawn, and yield (`npc::manners`) to the ego vehicle, too. They count
 //! neither towards the ten obstacles of the published package nor among `npc#1`, `npc#2`, …: their
-//! ids begin above [`COMMANDED_MAX`].
+//! ids begin above `state::ambient::COMMANDED_MAX`.
 
 use avastra_base::geometry::OrientedBox;
 use avastra_base::rng;

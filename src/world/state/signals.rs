@@ -62,19 +62,19 @@ pub(crate) struct SignalClock {
 
 /// What every signal shows, and until when.
 #[derive(Debug, Clone)]
-pub(crate) struct Shown {
+pub(crate) struct Colours {
     /// By index in `RoadMap::signals`.
-    pub colours: Arc<[SignalColour]>,
+    pub now: Arc<[SignalColour]>,
     /// The tick in which one of them changes.
     until: u64,
 }
 
-impl Shown {
-    pub fn at(clock: &SignalClock, map: &RoadMap, tick: u64) -> Shown {
+impl Colours {
+    pub fn at(clock: &SignalClock, map: &RoadMap, tick: u64) -> Colours {
         let all = 0..map.signals.len();
         let left = all.clone().map(|signal| clock.around(map, signal, tick).1).min();
-        Shown {
-            colours: all.map(|signal| clock.colour(map, signal, tick)).collect(),
+        Colours {
+            now: all.map(|signal| clock.colour(map, signal, tick)).collect(),
             until: left.map_or(u64::MAX, |left| tick + left),
         }
     }
@@ -82,7 +82,7 @@ impl Shown {
     /// Brings it up to date in a tick. Nothing is worked out before one of them changes.
     pub fn pass(&mut self, clock: &SignalClock, map: &RoadMap, tick: u64) {
         if tick >= self.until {
-            *self = Shown::at(clock, map, tick);
+            *self = Colours::at(clock, map, tick);
         }
     }
 }

@@ -20,7 +20,7 @@ use crate::state::obstacle::Obstacle;
 use crate::state::passed::Passed;
 use crate::state::road_user::RoadUser;
 use crate::state::sensed::{Conditions, EgoMotion, SignalColour};
-use crate::state::signals::{Shown, SignalClock};
+use crate::state::signals::{Colours, SignalClock};
 use crate::state::time::DT_S;
 use crate::state::trace::Trace;
 
@@ -104,7 +104,7 @@ pub struct World {
     pub(crate) conditions: Conditions,
     pub(crate) signals: SignalClock,
     /// What they show in this tick.
-    pub(crate) shown: Shown,
+    pub(crate) colours: Colours,
     /// What a light was told to show.
     pub(crate) switch: Option<Switch>,
     /// In order of appearance.
@@ -248,7 +248,7 @@ impl World {
 
     /// Colour of a signal now, by index in `RoadMap::signals`.
     pub fn signal(&self, signal: usize) -> SignalColour {
-        self.shown.colours[signal]
+        self.colours.now[signal]
     }
 
     /// Colour of a signal at a tick that is past.
@@ -282,7 +282,7 @@ impl World {
             traffic: _,
             // It follows from the station, and what is shown from the clock.
             ego_elevation_m: _,
-            shown: _,
+            colours: _,
             // It follows from the contacts, and they from what is traced.
             pushed_until: _,
             // No tick reads these.

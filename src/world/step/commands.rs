@@ -12,7 +12,7 @@ use crate::state::ego::VehicleParameters;
 use crate::state::manoeuvre::{PhaseCount, Running};
 use crate::state::road_user::{Motion, RoadUser};
 use crate::state::sensed::SignalColour;
-use crate::state::signals::Shown;
+use crate::state::signals::Colours;
 use crate::state::time::DT_S;
 use crate::state::world::{Switch, World};
 use crate::view::around::View;
@@ -196,7 +196,7 @@ impl World {
             return;
         };
         if self.signals != before {
-            self.shown = Shown::at(&self.signals, &self.scene.map, self.ticks);
+            self.colours = Colours::at(&self.signals, &self.scene.map, self.ticks);
             self.signals_until.push((from, before));
         }
     }

@@ -1,8 +1,7 @@
-//! The ego vehicle: Apollo's Lincoln MKZ as LGSVL runs it.
+//! How the ego vehicle moves, Apollo's Lincoln MKZ as LGSVL runs it (`state::ego`).
 //!
 //! A kinematic bicycle on the rear axle behind first-order actuators and inside the friction circle.
-//! Dimensions, limits and the pedal table are Apollo's published calibration for LGSVL; the lags are
-//! ours. No reverse gear, no load transfer, no tyre slip
+//! The pedal table is Apollo's published calibration for LGSVL. No reverse gear, no load transfer, no tyre slip
 //! angles: what the tyres cannot give is cut off instead.
 
 use avastra_base::geometry::{Pose, unit_vector, wrap_angle};

@@ -1,5 +1,4 @@
-//! The world of one episode, and what a tick does to it. `world/playback` moves it by a recording, `world/survey`
-//! answers what drawing asks.
+//! How one moment becomes the next: a tick of the world. `playback` moves it by a recording, `survey` answers what drawing asks.
 
 mod commands;
 mod contact;
@@ -28,7 +27,7 @@ use crate::state::obstacle::Moved;
 use crate::state::passed::Passed;
 use crate::state::road_user::RoadUser;
 use crate::state::sensed::SignalColour;
-use crate::state::signals::{Shown, SignalClock};
+use crate::state::signals::{Colours, SignalClock};
 use crate::state::time::{DT_S, FRAME_S, FRAME_TICKS, ticks};
 use crate::state::world::{Start, World};
 use crate::step::contact::{Party, meet};
@@ -76,7 +75,7 @@ impl World {
             pushed_until: 0,
             conditions: environment.conditions(speed_mps),
             environment,
-            shown: Shown::at(&signals, &scene.map, 0),
+            colours: Colours::at(&signals, &scene.map, 0),
             signals,
             switch: None,
             signals_until: Vec::new(),
@@ -132,7 +131,7 @@ impl World {
         self.users = users;
         self.measure();
         self.ticks += 1;
-        self.shown.pass(&self.signals, &self.scene.map, self.ticks);
+        self.colours.pass(&self.signals, &self.scene.map, self.ticks);
         self.switch_light();
         if self.ambient.wanted > 0 && self.ticks.is_multiple_of(RENEWAL_TICKS) {
             self.renew_ambient(false);

@@ -52,7 +52,7 @@ pub struct Around<'a> {
     pub users: [&'a [RoadUser]; 2],
     pub signals: &'a SignalClock,
     /// What each signal shows now.
-    pub shown: &'a [SignalColour],
+    pub colours: &'a [SignalColour],
     pub tick: u64,
     /// Friction under the ego vehicle.
     pub friction: f64,
@@ -61,7 +61,7 @@ pub struct Around<'a> {
     pub traffic: &'a TrafficProfile,
     /// Seed of the choices of road users.
     pub seed: u64,
-    /// As [`Start::reactions`](super::Start).
+    /// As `Start::reactions`.
     pub reactions: u64,
 }
 
@@ -226,7 +226,7 @@ impl World {
             ego_passed: self.ego_passed,
             users,
             signals: &self.signals,
-            shown: &self.shown.colours,
+            colours: &self.colours.now,
             tick: self.ticks,
             friction: self.conditions.friction,
             grip: self.environment.grip(),

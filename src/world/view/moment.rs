@@ -95,7 +95,7 @@ impl World {
 }
 
 impl Around<'_> {
-    /// The facts of this moment. A road user that looks around does not count itself: see [`MomentFacts::with`].
+    /// The facts of this moment. A road user that looks around does not count itself: see [`with_itself`].
     pub fn moment_facts(&self) -> MomentFacts {
         self.moment_facts_of(MomentParts {
             limit: true,
@@ -190,7 +190,7 @@ impl Around<'_> {
 
     /// What a traffic light shows; `None` without one.
     fn light(&self, signal: Option<usize>) -> Light {
-        match signal.map(|signal| self.shown[signal]) {
+        match signal.map(|signal| self.colours[signal]) {
             None => Light::None,
             Some(SignalColour::Red) => Light::Red,
             Some(SignalColour::Yellow) => Light::Yellow,

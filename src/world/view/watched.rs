@@ -200,7 +200,7 @@ impl Watched {
             let passed = lines.iter().rfind(|line| line.station_m <= front_m);
             self.red_line_m = passed.map(|line| (line.station_m, line.signal));
         }
-        let is_red = |signal: usize| around.shown[signal] == SignalColour::Red;
+        let is_red = |signal: usize| around.colours[signal] == SignalColour::Red;
         // It grows with every metre at red: one that stops behind the line has gone less far wrong than one that drives through.
         self.red_line_m =
             self.red_line_m.filter(|(line_m, signal)| front_m - line_m < OVER_RED_M_MAX && is_red(*signal));

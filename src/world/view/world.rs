@@ -54,7 +54,7 @@ impl World {
         into.ego = self.ego.motion;
         into.conditions = self.conditions;
         into.signals.clear();
-        into.signals.extend_from_slice(&self.shown.colours);
+        into.signals.extend_from_slice(&self.colours.now);
         into.objects.clear();
         let range_m = self.scene.range_m;
         for RoadUser { obstacle, mover } in self.users.iter().filter(|user| !user.obstacle.is_apart) {

@@ -12,7 +12,7 @@
 //! a wait crosses all areas of the junction and counts as if inside them, so that four that wait for each
 //! other do not all set out at once: they look one after another, and the first to look goes. After
 //! [`PATIENCE_S`] of waiting a driver goes before any vehicle that stands, whatever the order of the lanes;
-//! after [`GIVE_UP_S`] it leaves the world as soon as the ego vehicle does not see it. A standstill in sight
+//! after `GIVE_UP_S` it leaves the world as soon as the ego vehicle does not see it. A standstill in sight
 //! may last; an episode ends when the ego vehicle makes no progress.
 //!
 //! **Commanded vehicles and the ego vehicle.** A vehicle that an action made appear keeps these manners
@@ -226,7 +226,7 @@ fn ego_passage(area: &Area, around: &Around) -> Option<Passage> {
     let mut lanes = around.scene.route.lanes.iter();
     let lane = lanes.find(|part| part.lane == area.other && part.to_m > rear_m)?;
     let (from_m, to_m) = (lane.from_m + area.other_from_m, lane.from_m + area.other_to_m);
-    let is_red = |signal| around.shown[signal] == SignalColour::Red;
+    let is_red = |signal| around.colours[signal] == SignalColour::Red;
     let mut lines = around.scene.route.stop_lines.iter();
     let holds = lines.any(|line| (front_m - 1.0..from_m).contains(&line.station_m) && is_red(line.signal));
     Some(Passage {

@@ -23,7 +23,7 @@ impl Driver {
         }
         let front_m = self.station_m + size.length_m / 2.0;
         let line = self.way.stop_lines.iter().find(|line| line.station_m > front_m)?;
-        let colour = || around.shown[line.signal];
+        let colour = || around.colours[line.signal];
         self.stops_within_m(line.station_m - front_m, || match colour() {
             SignalColour::Green => None,
             SignalColour::Yellow => Some(YELLOW_BRAKING_MPS2),

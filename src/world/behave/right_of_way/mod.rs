@@ -15,7 +15,7 @@
 //! | one lane | a vehicle behind another keeps its distance | 13.5 |
 //!
 //! A vehicle is judged by its motion, whichever word told it so: a lane change, an offset, and a trajectory that lead
-//! the same way are judged alike. [`Ruling`] names the rule, its moment, and whose motion decided.
+//! the same way are judged alike. `Ruling` names the rule, its moment, and whose motion decided.
 //!
 //! To give way means not to make the other change its speed or direction *abruptly* (article 1), so what counts
 //! is the moment when the first of the two comes into the other's way. A vehicle that then leaves the other
@@ -45,7 +45,7 @@
 //! (articles 10.3 and 12). Any part of its body counts, such as the rear of a bus that swings over the line. If both are
 //! beyond it, neither has priority.
 //!
-//! The state is kept for each road user ([`Rights`]), looked at ten times a second, and read at a contact.
+//! The state is kept for each road user (`Rights`), looked at ten times a second, and read at a contact.
 
 use crate::behave::right_of_way::on_foot::light_before;
 use crate::behave::right_of_way::room::room_before_m;

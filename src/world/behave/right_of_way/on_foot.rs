@@ -96,7 +96,7 @@ fn ego_leaves_road_to(this: &Obstacle, strip: &Strip, around: &Around) -> bool {
 pub fn light_before(crosswalk_m: f64, around: &Around) -> Option<SignalColour> {
     let (map, route) = (&around.scene.map, &around.scene.route);
     let before = || route.stop_lines.iter().filter(|line| line.station_m < crosswalk_m);
-    let colour = |line: &StopLine| around.shown[line.signal];
+    let colour = |line: &StopLine| around.colours[line.signal];
     let near = before().filter(|line| line.station_m >= crosswalk_m - LIGHT_M).map(colour);
     near.max_by_key(|colour| *colour == SignalColour::Green).or_else(|| {
         let line = before().next_back()?;

@@ -131,7 +131,7 @@ impl Passed {
             match self.light.filter(|light| junction(light.signal) == junction(line.signal)) {
                 Some(light) => light.shown != Shown::Free,
                 // It has not come to its light yet, or was there before its light was looked at.
-                None => around.shown[line.signal] == SignalColour::Red,
+                None => around.colours[line.signal] == SignalColour::Red,
             }
         })
     }
@@ -162,7 +162,7 @@ pub fn by_stops(
 /// What a light shows a vehicle that passes it now.
 fn shown(signal: usize, speed_mps: f64, around: &Around) -> Shown {
     let map = &around.scene.map;
-    match around.shown[signal] {
+    match around.colours[signal] {
         SignalColour::Red => Shown::Red,
         SignalColour::Yellow => {
             let (since, _) = around.signals.around(map, signal, around.tick);
