@@ -227,7 +227,8 @@ impl Drive {
     fn tick(&mut self) {
         self.world.sense(&mut self.sensed);
         self.world.tick(&self.driver.drive(&self.sensed));
-        self.most = self.most.max(ProcKind::Avastra.danger(&self.world, &|_| false).probability);
+        let now = ProcKind::Avastra.danger(&self.world, &|_| false);
+        self.most = self.most.max(now.map_or(0.0, |danger| danger.probability));
     }
 }
 

@@ -37,6 +37,10 @@ impl Beside {
         if self.offset_m.abs() - across_m >= half_way_m {
             return None;
         }
+        if self.offset_m.abs() + across_m <= half_way_m {
+            let along_m = (cosine.abs() * length_m + sine.abs() * width_m) / 2.0;
+            return Some(Span { from_m: self.station_m - along_m, to_m: self.station_m + along_m });
+        }
         let centre = Vec2::new(self.station_m, self.offset_m);
         let ahead = Vec2::new(cosine, sine) * (length_m / 2.0);
         let left = Vec2::new(-sine, cosine) * (width_m / 2.0);

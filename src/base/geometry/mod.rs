@@ -13,6 +13,6 @@ mod smooth_step;
 pub use beside::{Beside, Span};
 pub use contact::{FirstContact, Frame, Sweep, distance_m, first_contact};
 pub use extreme::{larger, smaller};
-pub use path::{Bounds, Path, PathPoint, Projection};
+pub use path::{Bounds, Chord, Path, PathPoint, Projection};
 pub use pose::{OrientedBox, Pose, Vec2, extent_m, unit_vector, wrap_angle};
 pub use smooth_step::{SMOOTH_STEP_BEND_MAX, SMOOTH_STEP_SLOPE_MAX, SmoothStep, smooth_step};

@@ -39,6 +39,17 @@ pub struct Projection {
     pub distance_m: f64,
 }
 
+/// A straight line between two places of a path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Chord {
+    pub begin: Vec2,
+    /// Unit vector along it.
+    pub forward: Vec2,
+    pub heading_rad: f64,
+    /// Whether the path is straight from the one place to the other.
+    pub is_straight: bool,
+}
+
 /// A directed curve: at least two vertices, stations strictly rising from 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
@@ -306,6 +317,21 @@ impl Path {
         (a.position + (b.position - a.position) * fraction, forward)
     }
 
+    /// The straight line from the place at one station to that at a later one: without trigonometry where the path is straight.
+    pub fn chord(&self, from_m: f64, to_m: f64) -> Chord {
+        let (index, fraction) = self.locate(from_m);
+        let (a, b) = (&self.points[index], &self.points[index + 1]);
+        let begin = a.position + (b.position - a.position) * fraction;
+        let reaches_to = to_m <= b.station_m || index + 2 == self.points.len();
+        if a.heading_rad == b.heading_rad && reaches_to && (fraction >= 0.0 || index == 0) {
+            let heading_rad = wrap_angle(a.heading_rad);
+            return Chord { begin, forward: self.forwards[index], heading_rad, is_straight: true };
+        }
+        let along = self.position_at(to_m) - begin;
+        let heading_rad = libm::atan2(along.y, along.x);
+        Chord { begin, forward: along / along.norm(), heading_rad, is_straight: false }
+    }
+
     /// 1/m, positive to the left; 0 beyond the ends.
     pub fn curvature_at(&self, station_m: f64) -> f64 {
         let (index, fraction) = self.locate(station_m);
@@ -348,13 +374,23 @@ impl Path {
     pub fn project_from(&self, point: Vec2, guess_m: f64) -> Option<Beside> {
         let mut station_m = guess_m;
         for _ in 0..5 {
-            let (position, forward) = self.along(station_m);
-            let away = point - position;
+            let (index, fraction) = self.locate(station_m);
+            let (a, b) = (&self.points[index], &self.points[index + 1]);
+            let is_straight = a.heading_rad == b.heading_rad;
+            let forward = match is_straight {
+                true => self.forwards[index],
+                false => unit_vector(heading_between(a, b, fraction)),
+            };
+            let away = point - (a.position + (b.position - a.position) * fraction);
             let ahead_m = forward.dot(&away);
-            if ahead_m.abs() < 0.02 {
+            station_m += ahead_m;
+            // On a straight segment one step leads there.
+            let stays = is_straight
+                && (station_m >= a.station_m || index == 0)
+                && (station_m <= b.station_m || index + 2 == self.points.len());
+            if stays || ahead_m.abs() < 0.02 {
                 return Some(Beside { station_m, offset_m: forward.perp(&away), forward });
             }
-            station_m += ahead_m;
         }
         None
     }
@@ -599,6 +635,8 @@ mod tests {
         ) {
             let mut at = Pose { position: Vec2::zeros(), heading_rad: 0.0 };
             let samples: Vec<_> = turns.iter().map(|(turn_rad, step_m)| {
+                // A third of the segments goes straight on.
+                let turn_rad = if turn_rad.abs() < 0.2 { 0.0 } else { *turn_rad };
                 at = Pose { heading_rad: at.heading_rad + turn_rad, ..at }.offset(*step_m, 0.0);
                 (at.position, at.heading_rad, 0.0)
             }).collect();
@@ -610,6 +648,11 @@ mod tests {
             let begin = &path.points[all.segment];
             let length_m = path.points[all.segment + 1].station_m - begin.station_m;
             prop_assert_eq!(found.station_m, begin.station_m + all.fraction * length_m);
+            let chord = path.chord(near_m - 2.0, near_m + 0.7);
+            let (begin, end) = (path.position_at(near_m - 2.0), path.position_at(near_m + 0.7));
+            prop_assert!((chord.begin - begin).norm() < 1e-9);
+            prop_assert!((chord.begin + chord.forward * (end - begin).norm() - end).norm() < 1e-6);
+            prop_assert!((unit_vector(chord.heading_rad) - chord.forward).norm() < 1e-9);
             let near = path.project_near(point, near_m, 25.0);
             let part = path.nearest(point, path.segment(near_m - 25.0)..path.segment(near_m + 25.0) + 1);
             prop_assert_eq!(near.distance_m, part.distance_m2.sqrt());

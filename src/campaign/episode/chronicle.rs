@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use avastra_drivers::Ads;
 use avastra_lang::model::{BodyWord, Memory, OutcomeFacts};
 use avastra_world::action::Effect;
-use avastra_world::sim::{Contact, DT_S, Incident, Obstacle, Trace, World};
+use avastra_world::sim::{Contact, DT_S, Incident, Obstacle, Trace, Traced, World};
 
 use super::facts::collision_facts;
 use super::log::{Collision, Held};

@@ -387,8 +387,8 @@ impl Play {
         }
     }
 
-    /// One physics step. Returns the collision probability after it, or `None` if the driving system failed and nothing
-    /// moved. The probability is 1 at the tick of a contact. After that the obstacle is ignored: it stands against the
+    /// One physics step. Returns the collision probability after it, 0 where none is computed, or `None` if the driving system failed
+    /// and nothing moved. The probability is 1 at the tick of a contact. After that the obstacle is ignored: it stands against the
     /// ego vehicle for a while and is no danger any more.
     fn tick(&mut self, watch: &mut Watch) -> Option<Near> {
         self.world.sense(&mut self.sensed);
@@ -404,8 +404,8 @@ impl Play {
         if let Some(contact) = contacts.first() {
             return Some(Near { probability: 1.0, body: body(contact.obstacle) });
         }
-        let Danger { probability, nearest } =
-            self.setup.proc.danger(&self.world, &|id| self.chronicle.has_hit(id));
+        let now = self.setup.proc.danger(&self.world, &|id| self.chronicle.has_hit(id));
+        let Danger { probability, nearest } = now.unwrap_or_default();
         Some(Near { probability, body: nearest.and_then(body) })
     }
 

@@ -65,13 +65,17 @@ impl Other {
         let poses = forecast(map, object);
         let reach_m = SIDE_M + (object.length_m + object.width_m) / 2.0;
         let (from_m, to_m) = (station_m - BEHIND_M, station_m + guide.range_m());
-        let (first, mut tracer) = guide.trace(object.pose.position, from_m, to_m, reach_m);
+        let mut tracer = guide.trace(object.pose.position, from_m, to_m, reach_m);
         let mut places = [None; FORECAST_STEPS];
         for (step, place) in places.iter_mut().enumerate() {
             let (pose, next) = (poses[step / STRIDE], poses[step / STRIDE + 1]);
             let gone = next.position - pose.position;
             let part = (step % STRIDE) as f64 / STRIDE as f64;
-            let beside = if step == 0 { Some(first) } else { tracer.next(pose.position + gone * part) };
+            let beside = if step == 0 {
+                tracer.here().or_else(|| tracer.behind())
+            } else {
+                tracer.next(pose.position + gone * part)
+            };
             *place = beside
                 .filter(|beside| beside.offset_m.abs() < reach_m)
                 .map(|beside| Place::of(&beside, &pose, gone / STRIDE_S, object));

@@ -18,8 +18,8 @@ use super::speed::PREVIEW_S;
 
 /// Distance between samples, m. On the tightest bend a car can drive (5 m) the chord is 6 mm off.
 const SPACING_M: f64 = 0.5;
-/// Samples skipped by the rounds of a projection, coarse to fine: 8 m, 2 m, none.
-const STRIDES: [usize; 3] = [16, 4, 1];
+/// A search looks at every so many samples first, one in 8 m, and goes on from the nearest of them.
+const STRIDE: usize = 16;
 
 /// How far before and behind its last place a vehicle is looked for, m: more than it drives or errs
 /// within a tick, less than to another branch of the route.
@@ -30,6 +30,15 @@ const POSITION_ERROR_M: f64 = 2.0;
 
 /// Most steps along tangents until a place has settled; in a bend each step leaves a fraction of the error.
 const SLIDES_MAX: usize = 8;
+
+/// Added to a small number before its fraction is cut off, and taken away again without a half: it is rounded.
+const HALF_UP: f64 = 1024.5;
+
+/// Headings that differ by less belong to one straight piece, rad: 1 mm on 100 m.
+const STRAIGHT_RAD: f64 = 1e-5;
+
+/// A stretch that turns by less, rad, has no two pieces in reach of one place but next to its bend.
+const SIMPLE_RAD: f64 = 1.0;
 
 /// Step of the differences that give the slope of a guide beside the path, m.
 const H_M: f64 = 0.25;
@@ -81,6 +90,27 @@ struct Sample {
     heading_rad: f64,
     curvature_per_m: f64,
     speed_mps_max: f64,
+    /// The first and the last sample of the straight piece that it belongs to; both itself in a bend.
+    straight: [u32; 2],
+    /// How far the guide has turned from its start to here, to either side, rad.
+    turned_rad: f64,
+}
+
+/// Notes where the guide is straight, and how far it turns. On straight pieces, samples have the same heading to within rounding.
+fn note_turns(samples: &mut [Sample]) {
+    for index in 1..samples.len() {
+        let turn_rad = wrap_angle(samples[index].heading_rad - samples[index - 1].heading_rad).abs();
+        samples[index].turned_rad = samples[index - 1].turned_rad + turn_rad;
+    }
+    let is_even =
+        |a: &Sample, b: &Sample| (a.forward - b.forward).norm_squared() < STRAIGHT_RAD * STRAIGHT_RAD;
+    let mut first = 0;
+    while first < samples.len() {
+        let last =
+            first + samples[first..].iter().take_while(|next| is_even(&samples[first], next)).count() - 1;
+        samples[first..=last].iter_mut().for_each(|sample| sample.straight = [first as u32, last as u32]);
+        first = last + 1;
+    }
 }
 
 impl Guide {
@@ -127,6 +157,8 @@ impl Guide {
                     heading_rad: pose.heading_rad,
                     curvature_per_m,
                     speed_mps_max: limit_mps.min(rules.cruise_mps).min(curve_mps),
+                    straight: [0, 0],
+                    turned_rad: 0.0,
                 }
             })
             .collect();
@@ -136,6 +168,7 @@ impl Guide {
             let reachable_mps = (next_mps * next_mps + 2.0 * rules.slowdown_mps2 * SPACING_M).sqrt();
             samples[index].speed_mps_max = samples[index].speed_mps_max.min(reachable_mps);
         }
+        note_turns(&mut samples);
         Guide { samples, range_m: scene.range_m, is_motorway: scene.is_motorway }
     }
 
@@ -173,12 +206,13 @@ impl Guide {
                 heading_rad: pose.heading_rad,
                 curvature_per_m: wrap_angle(after.heading_rad - before.heading_rad) / way_m,
                 speed_mps_max: f64::INFINITY,
+                straight: [0, 0],
+                turned_rad: 0.0,
             }
         };
-        (
-            Guide { samples: (0..count).map(sample).collect(), range_m: RANGE_M, is_motorway: false },
-            stations_m,
-        )
+        let mut samples: Vec<Sample> = (0..count).map(sample).collect();
+        note_turns(&mut samples);
+        (Guide { samples, range_m: RANGE_M, is_motorway: false }, stations_m)
     }
 
     /// How far vehicles are sensed where it leads, m.
@@ -244,14 +278,13 @@ impl Guide {
         self.beside_sample(point, self.nearest(point, within).index)
     }
 
-    /// Projects a moving point: returns the first projection and a [`Tracer`] for the following ones, which
-    /// returns `None` beyond `reach_m`, most often without a search.
-    pub fn trace(&self, point: Vec2, from_m: f64, to_m: f64, reach_m: f64) -> (Beside, Tracer<'_>) {
+    /// Follows a moving point as far as it is within reach of the guide between two stations, most often without a search.
+    pub fn trace(&self, point: Vec2, from_m: f64, to_m: f64, reach_m: f64) -> Tracer<'_> {
         let within = Stretch { first: self.index(from_m), last: self.index(to_m) };
-        let nearest = self.nearest(point, within);
         let reach_m = reach_m + SPACING_M;
-        let tracer = Tracer { guide: self, within, reach_m, point, nearest };
-        (self.beside_sample(point, nearest.index), tracer)
+        let nearest = self.nearest_within(point, within, reach_m);
+        let turns_rad = self.samples[within.last].turned_rad - self.samples[within.first].turned_rad;
+        Tracer { guide: self, within, reach_m, is_simple: turns_rad.abs() < SIMPLE_RAD, point, nearest }
     }
 
     fn beside_sample(&self, point: Vec2, index: usize) -> Beside {
@@ -279,24 +312,36 @@ impl Guide {
         self.descend(point, first, whole).index
     }
 
-    /// The sample of a stretch that is nearest to a point, coarse to fine.
+    /// The sample of a stretch that is nearest to a point.
     fn nearest(&self, point: Vec2, within: Stretch) -> Nearest {
-        let Stretch { mut first, mut last } = within;
+        self.nearest_within(point, within, f64::INFINITY).expect("everything is within reach")
+    }
+
+    /// As [`Guide::nearest`], if it is within reach, m.
+    ///
+    /// # Errors
+    /// A distance beyond that reach, which the nearest sample has at least, m.
+    fn nearest_within(&self, point: Vec2, within: Stretch, reach_m: f64) -> Result<Nearest, f64> {
+        let Stretch { first, last } = within;
         let mut best = Nearest { index: last, distance_m2: self.squared_m2(point, last) };
-        for stride in STRIDES {
-            // Not `step_by`: it costs as much as the distances.
-            let (samples, mut index) = (&self.samples[..last], first);
-            while let Some(sample) = samples.get(index) {
-                let distance_m2 = (point - sample.position).norm_squared();
-                if distance_m2 < best.distance_m2 {
-                    best = Nearest { index, distance_m2 };
-                }
-                index += stride;
+        // Not `step_by`: it costs as much as the distances.
+        let (samples, mut index) = (&self.samples[..last], first);
+        while let Some(sample) = samples.get(index) {
+            let distance_m2 = (point - sample.position).norm_squared();
+            if distance_m2 < best.distance_m2 {
+                best = Nearest { index, distance_m2 };
             }
-            first = best.index.saturating_sub(stride - 1);
-            last = (best.index + stride).min(self.samples.len());
+            index += STRIDE;
         }
-        best
+        // No sample is farther than half a stride from one that was looked at.
+        let least_m = best.distance_m2.sqrt() - (STRIDE / 2) as f64 * SPACING_M;
+        if least_m > reach_m {
+            return Err(least_m);
+        }
+        let slid = self.slide(point, best.index, within);
+        let best = slid.unwrap_or_else(|| self.descend(point, best.index, within));
+        let distance_m = best.distance_m2.sqrt();
+        if distance_m <= reach_m { Ok(best) } else { Err(distance_m) }
     }
 
     /// The nearest sample, found by stepping along tangents from a sample nearby: much quicker than a
@@ -304,8 +349,16 @@ impl Guide {
     fn slide(&self, point: Vec2, from: usize, within: Stretch) -> Option<Nearest> {
         let mut index = from;
         for _ in 0..SLIDES_MAX {
-            let Sample { position, forward, .. } = self.samples[index];
-            let ahead = (forward.dot(&(point - position)) / SPACING_M) as i32 as isize;
+            let Sample { position, forward, straight, .. } = self.samples[index];
+            let ahead_m = forward.dot(&(point - position));
+            // On a straight piece the nearest sample needs no search.
+            let nearest = index.saturating_add_signed((ahead_m / SPACING_M + HALF_UP) as i32 as isize - 1024);
+            let is_inside = straight[0] as usize <= nearest && nearest <= straight[1] as usize;
+            let is_on_it = straight[0] < straight[1] && is_inside;
+            if is_on_it && within.first <= nearest && nearest <= within.last {
+                return Some(Nearest { index: nearest, distance_m2: self.squared_m2(point, nearest) });
+            }
+            let ahead = (ahead_m / SPACING_M) as i32 as isize;
             let next = index.saturating_add_signed(ahead).clamp(within.first, within.last);
             if next == index {
                 return Some(self.descend(point, index, within));
@@ -368,29 +421,58 @@ pub struct Tracer<'a> {
     guide: &'a Guide,
     within: Stretch,
     reach_m: f64,
-    /// The last position, and its nearest sample.
+    /// Whether the stretch turns so little that no two pieces of it pass one place within reach.
+    is_simple: bool,
+    /// The last position that was looked for, and its nearest sample; or the least distance of any, if it is out of reach.
     point: Vec2,
-    nearest: Nearest,
+    nearest: Result<Nearest, f64>,
 }
 
 impl Tracer<'_> {
+    /// The projection of the last position; `None` if it is out of reach.
+    pub fn here(&self) -> Option<Beside> {
+        let nearest = self.nearest.ok().filter(|nearest| self.is_near(nearest))?;
+        Some(self.guide.beside_sample(self.point, nearest.index))
+    }
+
+    /// The projection of the last position if it lies behind the stretch, in reach of the line that leads to its start.
+    pub fn behind(&self) -> Option<Beside> {
+        let beside = self.guide.beside_sample(self.point, self.within.first);
+        let is_behind = beside.station_m < self.within.first as f64 * SPACING_M;
+        (is_behind && beside.offset_m.abs() <= self.reach_m).then_some(beside)
+    }
+
+    /// Whether the point can come into reach within so much way, m: `false` is certain.
+    pub fn may_reach(&self, way_m: f64) -> bool {
+        self.least_m().is_none_or(|least_m| least_m - way_m <= self.reach_m)
+    }
+
+    /// The least distance that the last position has, if it is out of reach, m.
+    fn least_m(&self) -> Option<f64> {
+        match &self.nearest {
+            Ok(nearest) if self.is_near(nearest) => None,
+            Ok(nearest) => Some(nearest.distance_m2.sqrt()),
+            Err(least_m) => Some(*least_m),
+        }
+    }
+
+    fn is_near(&self, nearest: &Nearest) -> bool {
+        nearest.distance_m2 <= self.reach_m * self.reach_m
+    }
+
     /// The projection of the next position; `None` if it is out of reach.
     pub fn next(&mut self, point: Vec2) -> Option<Beside> {
-        let distance_m = self.nearest.distance_m2.sqrt();
-        let slid = if distance_m <= self.reach_m {
-            self.guide.slide(point, self.nearest.index, self.within)
-        } else if distance_m - (point - self.point).norm() > self.reach_m {
-            // The point cannot be nearer than the last distance less the way that it has moved.
+        // The point cannot be nearer than the last distance less the way that it has moved.
+        if self.least_m().is_some_and(|least_m| least_m - (point - self.point).norm() > self.reach_m) {
             return None;
-        } else {
-            None
-        };
+        }
+        let slid = self.nearest.ok().and_then(|from| self.guide.slide(point, from.index, self.within));
         // A point that is out of reach of the stretch near by may be in reach of another bend.
-        let near = |nearest: &Nearest| nearest.distance_m2 <= self.reach_m * self.reach_m;
-        self.nearest = slid.filter(near).unwrap_or_else(|| self.guide.nearest(point, self.within));
+        let counts = |nearest: &Nearest| self.is_simple || self.is_near(nearest);
+        let search = || self.guide.nearest_within(point, self.within, self.reach_m);
+        self.nearest = slid.filter(counts).map_or_else(search, Ok);
         self.point = point;
-        let is_in_reach = self.nearest.distance_m2.sqrt() <= self.reach_m;
-        is_in_reach.then(|| self.guide.beside_sample(point, self.nearest.index))
+        self.here()
     }
 }
 
@@ -434,8 +516,9 @@ mod tests {
             // From beside the route in all directions, up to 2.2 m a step.
             let start = guide.pose_at(f64::from(case % 100) * 3.5).offset(0.0, f64::from(case % 13) - 6.0);
             let step = unit_vector(f64::from(case) * 0.7) * (f64::from(case % 11) * 0.22);
-            let (first, mut tracer) = guide.trace(start.position, from_m, to_m, reach_m);
-            assert_eq!(first, guide.project(start.position, from_m, to_m));
+            let mut tracer = guide.trace(start.position, from_m, to_m, reach_m);
+            let first = guide.project(start.position, from_m, to_m);
+            assert!(tracer.here().is_none_or(|here| here == first));
             for moment in 1..=25 {
                 let point = start.position + step * f64::from(moment);
                 let anew = guide.project(point, from_m, to_m);
@@ -450,8 +533,9 @@ mod tests {
                         near += 1;
                     }
                     None => {
-                        let beyond = anew.station_m < from_m - reach_m || anew.station_m > to_m + reach_m;
-                        assert!(anew.offset_m.abs() > reach_m || beyond, "case {case}: {anew:?}");
+                        let beyond_m = (from_m - anew.station_m).max(anew.station_m - to_m).max(0.0);
+                        let away_m = libm::hypot(beyond_m, anew.offset_m);
+                        assert!(away_m > reach_m, "case {case}: {anew:?}");
                         far += 1;
                     }
                 }

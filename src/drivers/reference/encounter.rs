@@ -58,7 +58,8 @@ impl Encounter {
         let forward = unit_vector(object.pose.heading_rad);
         let size = (object.length_m, object.width_m);
         let beside_m = (object.length_m + object.width_m + car.width_m) / 2.0;
-        let (beside, mut tracer) = guide.trace(object.pose.position, from_m, to_m, beside_m);
+        let beside = guide.project(object.pose.position, from_m, to_m);
+        let mut tracer = guide.trace(object.pose.position, from_m, to_m, beside_m);
         let (along_m, across_m) = extent_m(forward, beside.forward, size);
         if beside.station_m + along_m / 2.0 < front_m - car.length_m {
             return None;

@@ -202,19 +202,15 @@ impl Idm {
         let taken = |beside: &Beside| beside.taken(forward, object.length_m, object.width_m, HALF_WAY_M);
         let reach_m = HALF_WAY_M + (object.length_m + object.width_m) / 2.0;
         let behind_m = if self.scene.is_motorway { self.scene.range_m } else { 10.0 };
-        let (beside, mut tracer) = self.guide().trace(
-            object.pose.position,
-            rear_m - behind_m,
-            front_m + self.scene.range_m,
-            reach_m,
-        );
-        // On a motorway who is behind keeps the distance, also beside the lane or on the way into it.
-        if self.scene.is_motorway && beside.station_m < rear_m {
-            return None;
-        }
-        if let Some(span) = taken(&beside) {
-            // It is on the way now; once its middle is behind the front, the ego vehicle is past it.
-            return (span.middle_m() > front_m - BESIDE_M).then(|| Ahead {
+        let (position, from_m) = (object.pose.position, rear_m - behind_m);
+        let to_m = front_m + self.scene.range_m;
+        let mut tracer = self.guide().trace(position, from_m, to_m, reach_m);
+        let now = tracer.here().or_else(|| tracer.behind());
+        if let Some((beside, span)) = now.and_then(|beside| Some((beside, taken(&beside)?))) {
+            // On a motorway who is behind keeps the distance, also on the way into the lane. Once its middle is behind the
+            // front, the ego vehicle is past it.
+            let follows = self.scene.is_motorway && beside.station_m < rear_m;
+            return (!follows && span.middle_m() > front_m - BESIDE_M).then(|| Ahead {
                 near_m: span.from_m,
                 age_s: 0.0,
                 speed_mps: object.velocity_mps.dot(&beside.forward).max(0.0),
@@ -224,10 +220,22 @@ impl Idm {
         if object.velocity_mps == Vec2::zeros() {
             return None;
         }
-        let seen = beside;
-        let front = self.guide().pose_at(front_m).position;
+        // On a motorway the road takes it along, elsewhere it is expected straight on.
+        let seen = match self.scene.is_motorway {
+            true => Some(self.guide().project(position, from_m, to_m)),
+            false if !tracer.may_reach(LOOK_AHEAD_S * object.velocity_mps.norm()) => return None,
+            false => None,
+        };
+        if seen.is_some_and(|beside| beside.station_m < rear_m) {
+            return None;
+        }
+        let expected = |time_s: f64| match &seen {
+            Some(beside) => self.guide().expected(object, beside, time_s),
+            None => position + object.velocity_mps * time_s,
+        };
+        let front = self.guide().position_at(front_m);
         for &Reach { time_s, from_m: ego_from_m, to_m: ego_to_m } in reaches {
-            let position = self.guide().expected(object, &seen, time_s);
+            let position = expected(time_s);
             let within_m = GUIDE_STRETCH_MAX * (ego_to_m - front_m) + reach_m;
             if (position - front).norm_squared() > within_m * within_m {
                 continue;

@@ -56,6 +56,7 @@ impl Mind {
     pub fn note(&mut self, world: &World, ads: &dyn Ads, contacts: &[Contact]) {
         self.hit.extend(contacts.iter().map(|contact| contact.obstacle));
         let danger = ProcKind::default().danger(world, &|id| self.hit.contains(&id));
+        let before = self.commands.last().map_or(0.0, |command| command.probability);
         let status = ads.status();
         let motion = world.ego();
         self.commands.push(Command {
@@ -63,7 +64,7 @@ impl Mind {
             steer_rad: motion.steer_rad,
             throttle_pct: status.control.throttle_pct,
             brake_pct: status.control.brake_pct,
-            probability: if contacts.is_empty() { danger.probability } else { 1.0 },
+            probability: if contacts.is_empty() { danger.map_or(before, |now| now.probability) } else { 1.0 },
         });
         if world.ticks().is_multiple_of(FRAME_TICKS) {
             self.look(world.ticks(), status);

@@ -7,9 +7,9 @@
 
 use avastra_base::geometry::wrap_angle;
 use avastra_base::kinematics::braking_m;
-use avastra_world::sim::{Obstacle, World};
+use avastra_world::sim::{FRAME_TICKS, Obstacle, World};
 
-use super::released_probability::released_probability;
+use super::released_probability::{PERIOD_TICKS, released_probability};
 
 /// Braking of every vehicle, magnitude, m/s². Paper: 6 (Berkeley algorithm).
 const VEHICLE_DECEL_MPS2: f64 = 6.0;
@@ -35,13 +35,15 @@ pub enum ProcKind {
 }
 
 impl ProcKind {
-    /// ProC of the ego vehicle at this moment; see `collision_probability`.
-    pub fn danger(self, world: &World, is_hit: &dyn Fn(u32) -> bool) -> Danger {
-        match self {
+    /// ProC of the ego vehicle at this moment, see `collision_probability`; `None` at ticks at which it is not computed. Ours is
+    /// computed in each frame, 10 times a second, that of the package twice a second.
+    pub fn danger(self, world: &World, is_hit: &dyn Fn(u32) -> bool) -> Option<Danger> {
+        let every_ticks = if self == ProcKind::Released { PERIOD_TICKS } else { FRAME_TICKS };
+        world.ticks().is_multiple_of(every_ticks).then(|| match self {
             ProcKind::Avastra => collision_probability(world, LATERAL_MARGIN_M, is_hit),
             ProcKind::Paper => collision_probability(world, 0.0, is_hit),
             ProcKind::Released => released_probability(world, is_hit),
-        }
+        })
     }
 }
 

@@ -12,7 +12,7 @@ use avastra_world::sim::World;
 use super::collision_probability::{Danger, Most, probability};
 
 /// Ticks from one computation to the next: 0.5 s.
-const PERIOD_TICKS: u64 = 25;
+pub const PERIOD_TICKS: u64 = 25;
 /// Slopes that differ by less count as one direction. This and the following constants are the package's.
 const SLOPE_DIFFERENCE_MAX: f64 = 0.6;
 /// Stands for 0 where the package avoids a division by it.
@@ -23,12 +23,8 @@ const PEDESTRIAN_DECEL_MPS2: f64 = 1.5;
 /// Added to both safety distances, m.
 const MARGIN_M: f64 = 5.0;
 
-/// ProC at this moment; 0 at the ticks at which the package does not compute it. Obstacles that the ego
-/// vehicle has hit already (`is_hit`) are left out.
+/// ProC at this moment. Obstacles that the ego vehicle has hit already (`is_hit`) are left out.
 pub fn released_probability(world: &World, is_hit: &dyn Fn(u32) -> bool) -> Danger {
-    if !world.ticks().is_multiple_of(PERIOD_TICKS) {
-        return Danger::default();
-    }
     let ego = world.ego_outline().pose;
     let velocity = ego.forward() * world.ego().speed_mps.max(LEAST);
     let mut most = Most::default();

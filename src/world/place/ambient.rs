@@ -39,9 +39,9 @@ const ROOM_M: f64 = 20.0;
 /// Least distance of a newcomer to the end of a street, where a signal may be red, m: the way to brake
 /// from 50 km/h at 3 m/s², rounded down.
 const STREET_END_M: f64 = 30.0;
-/// Draws before an attempt is given up. A motorway is long, and most of it is far from the ego vehicle.
-const DRAWS_MAX: usize = 8;
-const MOTORWAY_DRAWS_MAX: usize = 64;
+/// Draws before an attempt is given up: at the start, when all are to find a place, and later.
+const START_DRAWS_MAX: usize = 256;
+const DRAWS_MAX: usize = 64;
 
 impl Ambient {
     /// One attempt at a newcomer. `begins`: before the first tick, when the ego vehicle has seen nothing.
@@ -50,7 +50,7 @@ impl Ambient {
         self.attempts += 1;
         let range_m = around.scene.range_m;
         let nearest_m = if begins { START_ROOM_M.max(START_ROOM_S * around.ego.speed_mps) } else { range_m };
-        let draws = if around.scene.is_motorway { MOTORWAY_DRAWS_MAX } else { DRAWS_MAX };
+        let draws = if begins { START_DRAWS_MAX } else { DRAWS_MAX };
         let id = self.next_id;
         let placed = (0..draws).find_map(|_| draw(around, nearest_m, id, &mut rng))?;
         self.next_id += 1;
@@ -81,9 +81,12 @@ fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<RoadU
     let size = body::parameters(body);
     let centre = &around.scene.map.lane(lane).centre;
     let around_m = around.scene.range_m + AROUND_M;
-    let away = centre.pose_at(station_m).position - around.ego_outline.pose.position;
+    let here = centre.position_at(station_m);
+    let away = here - around.ego_outline.pose.position;
+    let is_taken = |other: &Obstacle| (other.outline.pose.position - here).norm_squared() < ROOM_M * ROOM_M;
     if !(nearest_m * nearest_m..around_m * around_m).contains(&away.norm_squared())
         || !(size.length_m..centre.length_m() - STREET_END_M).contains(&station_m)
+        || around.obstacles().any(is_taken)
     {
         return None;
     }

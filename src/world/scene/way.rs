@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use avastra_base::geometry::{Bounds, Path, Pose, Vec2};
+use avastra_base::geometry::{Bounds, Chord, Path, Pose, Vec2};
 use avastra_base::rng;
 use avastra_base::rng::Rng;
 use avastra_lang::model::vocabulary::Turning;
@@ -58,8 +58,8 @@ pub(crate) struct Way {
     pub path: Path,
     lanes: Vec<WayLane>,
     heights: Heights,
-    /// One bit for each lane of the way, its index modulo 64: tells quickly of most lanes that they are not on the way.
-    lane_bits: u64,
+    /// Tells quickly of most lanes that they are not on the way.
+    pub lane_set: LaneSet,
     /// By rising station.
     pub stop_lines: Vec<StopLine>,
     /// Lines of stop signs, by rising station, m.
@@ -73,6 +73,21 @@ pub(crate) struct Way {
     /// Where a vehicle that does not turn off must stop, m: a closed way goes on straight beyond its end, as
     /// a road does beyond the edge of a map, but not into other lanes.
     pub end_m: Option<f64>,
+}
+
+/// Some lanes: one bit for each, its index modulo 64.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct LaneSet(u64);
+
+impl LaneSet {
+    pub fn with(self, lane: LaneIndex) -> LaneSet {
+        LaneSet(self.0 | 1 << (lane.0 % 64))
+    }
+
+    /// Whether a lane may be in both: `false` is certain.
+    pub fn may_meet(self, other: LaneSet) -> bool {
+        self.0 & other.0 != 0
+    }
 }
 
 /// Lanes that begin farther ahead than this do not matter yet, m.
@@ -159,14 +174,14 @@ impl Way {
         let open = chain.last().is_some_and(|last| !map.lane(*last).successors.is_empty());
         let speeds_mps_max = bend_speeds_mps(&path);
         let end_m = if open { None } else { free_end_m(map, &path) };
-        let lane_bits = lanes.iter().fold(0, |bits, part| bits | lane_bit(part.lane));
+        let lane_set = lanes.iter().fold(LaneSet::default(), |set, part| set.with(part.lane));
         areas.sort_by(|a, b| a.from_m.total_cmp(&b.from_m).then(a.other.cmp(&b.other)));
         let heights = Heights::chained(lanes.iter().map(|part| (part.from_m, map.lane(part.lane))));
         Some(Way {
             path,
             lanes,
             heights,
-            lane_bits,
+            lane_set,
             stop_lines,
             stop_signs_m,
             areas,
@@ -201,7 +216,7 @@ impl Way {
 
     /// Whether the way may take a lane: `false` is certain.
     pub fn may_take(&self, lane: LaneIndex) -> bool {
-        self.lane_bits & lane_bit(lane) != 0
+        self.lane_set.may_meet(LaneSet::default().with(lane))
     }
 
     /// Station at which a lane begins, if the way takes it and a rear at `rear_m` has not left it yet.
@@ -332,21 +347,18 @@ pub(crate) fn in_words(to: Turning) -> &'static str {
     }
 }
 
-/// Where the outline's centre of a body is that has driven to a station of a way: both axles are on the way.
+/// Where the outline's centre of a body is that has driven to a station of a way, and its wheelbase: both axles are on the
+/// way.
 ///
 /// The station is that of the rear axle plus the distance from there to the centre, so on a straight
 /// way it is the centre's. In a bend the body is a chord of the way: its middle cuts the bend, and its
 /// tail swings out less than if the body turned about its centre. A real rear axle cuts a bend farther;
 /// its driver swings out before to stay in the lane, which is not modelled.
-pub(crate) fn body_at(path: &Path, station_m: f64, body: &BodyParameters) -> Pose {
+pub(crate) fn body_at(path: &Path, station_m: f64, body: &BodyParameters) -> (Pose, Chord) {
     let rear_m = station_m - body.rear_axle_m;
-    let rear = path.position_at(rear_m);
-    let wheelbase = path.position_at(rear_m + body.wheelbase_m) - rear;
-    let length_m = wheelbase.norm();
-    Pose {
-        position: rear + wheelbase * (body.rear_axle_m / length_m),
-        heading_rad: libm::atan2(wheelbase.y, wheelbase.x),
-    }
+    let wheelbase = path.chord(rear_m, rear_m + body.wheelbase_m);
+    let Chord { begin, forward, heading_rad, .. } = wheelbase;
+    (Pose { position: begin + forward * body.rear_axle_m, heading_rad }, wheelbase)
 }
 
 /// The ways that were asked for on a map so far, by their lanes. Every row asks for its ways at every
@@ -396,10 +408,6 @@ fn free_end_m(map: &RoadMap, path: &Path) -> Option<f64> {
     taken.next().map(|beyond_m| {
         path.length_m() + if beyond_m > 2.0 * BEYOND_STEP_M { beyond_m - BEYOND_STEP_M } else { 0.0 }
     })
-}
-
-fn lane_bit(lane: LaneIndex) -> u64 {
-    1 << (lane.0 % 64)
 }
 
 /// The speed of the bend at each vertex, lowered so that braking for the next ones stays gentle.

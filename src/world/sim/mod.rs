@@ -44,7 +44,7 @@ pub use crate::state::obstacle::Obstacle;
 pub use crate::state::ruling::{Mover, Rule, Ruling};
 pub use crate::state::sensed::{Conditions, EgoMotion, Sensed, SensedObject, SignalColour};
 pub use crate::state::time::{DT_S, FRAME_S, FRAME_TICKS};
-pub use crate::state::trace::Trace;
+pub use crate::state::trace::{Trace, Traced};
 pub use crate::state::world::{ENGINE, Start, World};
 pub use crate::step::ego::{Control, pedal_acceleration_mps2, pedals_for};
 pub use crate::view::encroachment::Encroachment;

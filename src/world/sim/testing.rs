@@ -14,7 +14,7 @@ use avastra_road::{RoadMap, Route};
 
 use crate::scene::Scene;
 use crate::scene::traffic::TrafficProfile;
-use crate::state::trace::Trace;
+use crate::state::trace::{Trace, Traced};
 use crate::state::world::{Start, World};
 
 /// A driving lane without links.

@@ -2,7 +2,7 @@
 
 use avastra_lang::model::AMBIENT_MAX;
 
-use crate::state::trace::Trace;
+use crate::state::trace::traced;
 
 /// Ids up to this are of obstacles that an action made appear.
 pub const COMMANDED_MAX: u32 = 1_000_000;
@@ -19,9 +19,8 @@ impl Ambient {
     pub fn new(wanted: u32) -> Ambient {
         Ambient { wanted: wanted.min(AMBIENT_MAX), attempts: 0, next_id: COMMANDED_MAX + 1 }
     }
+}
 
-    pub fn trace(&self, trace: &mut Trace) {
-        let Ambient { wanted, attempts, next_id } = *self;
-        trace.words([u64::from(wanted), attempts, u64::from(next_id)]);
-    }
+traced! {
+    Ambient { wanted, attempts, next_id };
 }

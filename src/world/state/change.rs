@@ -8,7 +8,7 @@ use avastra_lang::model::command::AsideBy;
 use avastra_lang::model::vocabulary::{LaneChoice, Side};
 
 use crate::scene::way::Way;
-use crate::state::trace::Trace;
+use crate::state::trace::{Trace, Traced, traced};
 
 /// Below this speed a lane change slows down with the vehicle, which cannot slide sideways, m/s.
 pub const CHANGE_FULL_MPS: f64 = 5.0;
@@ -135,28 +135,6 @@ impl Aside {
             }
         }
     }
-
-    pub fn trace(&self, trace: &mut Trace) {
-        let Aside { lane, was_told_midway, wanted_m, now_m, told, shift } = *self;
-        let (by_speed, by_time) = match told {
-            None => (None, None),
-            Some(AsideBy::Speed(mps)) => (Some(mps), None),
-            Some(AsideBy::Time(takes_s)) => (None, Some(takes_s)),
-        };
-        trace.flags([
-            lane.is_some(),
-            was_told_midway,
-            by_speed.is_some(),
-            by_time.is_some(),
-            shift.is_some(),
-        ]);
-        trace.words(lane.map(|lane| lane as u64));
-        trace.numbers([wanted_m, now_m]);
-        trace.numbers(by_speed.or(by_time));
-        if let Some(Shift { from_m, to_m, progress, duration_s }) = shift {
-            trace.numbers([from_m, to_m, progress, duration_s]);
-        }
-    }
 }
 
 /// A pose so far to the left of another one, m; the same to the bit at 0 m.
@@ -171,4 +149,21 @@ pub fn beside(pose: Pose, left_m: f64) -> Pose {
 pub fn left_of(heading_rad: f64) -> Vec2 {
     let forward = unit_vector(heading_rad);
     Vec2::new(-forward.y, forward.x)
+}
+
+traced! {
+    // The way that it leads to follows from the lane that it leaves and the side.
+    Change { to_station_m, progress, duration_s, ends_m, broken_off } but { to };
+    BrokenOff { progress, duration_s };
+    Aside { lane, was_told_midway, wanted_m, now_m, told, shift };
+    Shift { from_m, to_m, progress, duration_s };
+}
+
+impl Traced for AsideBy {
+    fn trace(&self, trace: &mut Trace) {
+        match self {
+            AsideBy::Speed(mps) => (0_u64, *mps).trace(trace),
+            AsideBy::Time(takes_s) => (1_u64, *takes_s).trace(trace),
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use avastra_base::geometry::{Pose, Vec2, unit_vector};
+use avastra_base::geometry::{Chord, Pose, Vec2, unit_vector};
 use avastra_lang::model::body::BodyParameters;
 use avastra_lang::model::command::IgnoredRules;
 use avastra_lang::model::vocabulary::{Side, Turning};
@@ -11,11 +11,11 @@ use avastra_road::LaneIndex;
 use crate::action::LaneChangeRules;
 use crate::scene::Scene;
 use crate::scene::way::{Way, body_at};
-use crate::state::change::{Aside, BrokenOff, Change, PlannedChange, Towards, beside, left_of};
+use crate::state::change::{Aside, Change, PlannedChange, Towards, beside, left_of};
 use crate::state::obstacle::{Moved, Obstacle};
 use crate::state::pursuit::Pursuit;
 use crate::state::time::DT_S;
-use crate::state::trace::Trace;
+use crate::state::trace::traced;
 
 /// Time at rest for others after which a driver leaves the world, s. Ours: less than the 24 s without
 /// progress that end an episode of the shipped space.
@@ -106,13 +106,6 @@ pub struct MeantTurn {
     pub lane: Option<LaneIndex>,
 }
 
-impl MeantTurn {
-    pub fn trace(self, trace: &mut Trace) {
-        let MeantTurn { to, lane } = self;
-        trace.words([to as u64, lane.map_or(0, |lane| lane.0 as u64 + 1)]);
-    }
-}
-
 impl Driver {
     /// A driver with its centre at a station of a way, at its cruising speed or what the bend there
     /// allows. `plan` is in order.
@@ -164,10 +157,9 @@ impl Driver {
 
     /// Where it is before its first tick.
     pub fn moved(&self, size: &BodyParameters) -> Moved {
-        let pose = self.beside_way(body_at(&self.way.path, self.station_m, size));
-        let forward = pose.forward();
+        let (on_way, Chord { forward, .. }) = body_at(&self.way.path, self.station_m, size);
         Moved {
-            pose,
+            pose: self.beside_way(on_way),
             forward,
             lane_heading_rad: self.lane_heading_rad(),
             velocity_mps: forward * self.speed_mps,
@@ -285,79 +277,22 @@ impl Driver {
         }
         (unit_vector(self.lane_heading_rad()).perp(&over) + ends_m - now_m).abs()
     }
+}
 
-    /// Feeds every bit that later ticks depend on to `trace`; ways follow from the draws
-    /// and from what it was told for the next junction.
-    pub fn trace(&self, trace: &mut Trace) {
-        let Driver {
-            station_m,
-            speed_mps,
-            cruise_mps,
-            ordered_mps2,
-            time_gap_s,
-            aggression,
-            leader,
-            hold_m,
-            insists_to_m,
-            stopped_to_m,
-            waited_ticks,
-            change,
-            aside,
-            ignores,
-            has_siren,
-            pursuit,
-            turn,
-            last_change,
-            plan,
-            draws,
-            limit_part,
-            yields_to_ego,
-            // The way follows from where it appeared and from what it drew, changed and was told since.
-            way: _,
-            // Rules permit what is then seen in `change`.
-            lane_changes: _,
-            // No tick reads it.
-            late_s: _,
-        } = self;
-        trace.flags([
-            leader.is_some(),
-            hold_m.is_some(),
-            ordered_mps2.is_some(),
-            change.is_some(),
-            aside.is_some(),
-            pursuit.is_some(),
-            turn.is_some(),
-            last_change.is_some(),
-            limit_part.is_some(),
-            *has_siren,
-            *yields_to_ego,
-        ]);
-        trace.numbers([*station_m, *speed_mps, *cruise_mps, *time_gap_s, *insists_to_m, *stopped_to_m]);
-        trace.words([*waited_ticks, *aggression, *draws].map(u64::from));
+traced! {
+    Driver {
+        station_m, speed_mps, cruise_mps, ordered_mps2, time_gap_s, aggression, leader, hold_m, insists_to_m, stopped_to_m,
+        waited_ticks, change, aside, ignores => ignores.bits(), has_siren, pursuit, turn, last_change,
         // What is planned was drawn as it appeared: how much of it is left tells the rest.
-        trace.words([u64::from(ignores.bits()), plan.len() as u64]);
-        if let Some(Leader { gap_m, speed_mps, crosswise }) = *leader {
-            trace.numbers([gap_m, speed_mps]);
-            trace.flags([crosswise]);
-        }
-        trace.numbers(hold_m.iter().chain(ordered_mps2).chain(limit_part).copied());
-        // The way that it leads to follows from the lane that it leaves and the side.
-        if let Some(Change { to: _, to_station_m, progress, duration_s, ends_m, broken_off }) = change {
-            trace.numbers([*to_station_m, *progress, *duration_s, *ends_m]);
-            trace.flags([broken_off.is_some()]);
-            if let Some(BrokenOff { progress, duration_s }) = *broken_off {
-                trace.numbers([progress, duration_s]);
-            }
-        }
-        if let Some(aside) = aside {
-            aside.trace(trace);
-        }
-        if let Some(pursuit) = pursuit {
-            pursuit.trace(trace);
-        }
-        if let Some(turn) = turn {
-            turn.trace(trace);
-        }
-        trace.words(last_change.map(|side| side as u64));
-    }
+        plan => plan.len(), draws, limit_part, yields_to_ego
+    } but {
+        // It follows from where it appeared and from what it drew, changed and was told since.
+        way,
+        // Rules permit what is then seen in `change`.
+        lane_changes,
+        // No tick reads it.
+        late_s
+    };
+    Leader { gap_m, speed_mps, crosswise };
+    MeantTurn { to, lane };
 }

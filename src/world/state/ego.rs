@@ -3,7 +3,7 @@
 use avastra_base::geometry::{Frame, OrientedBox, Pose, Vec2};
 
 use crate::state::sensed::EgoMotion;
-use crate::state::trace::Trace;
+use crate::state::trace::traced;
 
 /// Dimensions and limits (Apollo `vehicle_param.pb.txt` of the LGSVL calibration).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,26 +94,6 @@ impl Ego {
         self.outline = outline_at(&motion.rear_axle, forward);
         self.frame = Frame::along(&self.outline, forward);
     }
-
-    /// Every bit that later ticks depend on.
-    pub fn trace(&self, trace: &mut Trace) {
-        // Outline and frame follow from the pose.
-        let Ego { motion, throttle_pct, brake_pct, outline: _, frame: _ } = self;
-        let EgoMotion { rear_axle, speed_mps, acceleration_mps2, yaw_rate_radps, steer_rad, touched } =
-            motion;
-        trace.numbers([
-            rear_axle.position.x,
-            rear_axle.position.y,
-            rear_axle.heading_rad,
-            *speed_mps,
-            *acceleration_mps2,
-            *yaw_rate_radps,
-            *steer_rad,
-            *throttle_pct,
-            *brake_pct,
-        ]);
-        trace.flags([*touched]);
-    }
 }
 
 /// The outline of the ego vehicle whose rear axle is at a pose, of which `forward` is the unit vector.
@@ -121,4 +101,10 @@ fn outline_at(rear_axle: &Pose, forward: Vec2) -> OrientedBox {
     let car = &VehicleParameters::MKZ;
     let position = rear_axle.position + forward * car.rear_axle_to_centre_m();
     OrientedBox::new(Pose { position, ..*rear_axle }, car.length_m, car.width_m)
+}
+
+traced! {
+    // Outline and frame follow from the pose.
+    Ego { motion, throttle_pct, brake_pct } but { outline, frame };
+    EgoMotion { rear_axle, speed_mps, acceleration_mps2, yaw_rate_radps, steer_rad, touched };
 }

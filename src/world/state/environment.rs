@@ -26,7 +26,7 @@
 use avastra_lang::model::vocabulary::{Level, Phenomenon, TimeOfDay};
 
 use crate::state::sensed::Conditions;
-use crate::state::trace::Trace;
+use crate::state::trace::traced;
 
 /// A camera's light, 1 at noon. Ours: a low sun costs a camera some contrast, twilight lies between it and night, and
 /// street lamps leave it the recognition range that low beams give (35 to 50 %) on few pixels.
@@ -124,14 +124,6 @@ impl Environment {
             friction: self.grip.friction(ego_mps),
         }
     }
-
-    pub fn trace(&self, trace: &mut Trace) {
-        // The grip follows from the water.
-        let Environment { time, sky, water_mm, grip: _ } = *self;
-        trace.word(time as u64);
-        trace.words(sky.map(|level| level as u64));
-        trace.number(water_mm);
-    }
 }
 
 /// Friction of a tyre on a road with some depth of water: the table, linear between its entries and held
@@ -166,6 +158,11 @@ fn place(entries: &[f64], value: f64) -> (usize, f64) {
     let after = entries.partition_point(|entry| *entry <= value).clamp(1, entries.len() - 1);
     let (from, to) = (entries[after - 1], entries[after]);
     (after - 1, ((value - from) / (to - from)).clamp(0.0, 1.0))
+}
+
+traced! {
+    // The grip follows from the water.
+    Environment { time, sky, water_mm } but { grip };
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use avastra_lang::model::Trajectory;
 use avastra_lang::model::body::BodyParameters;
 
 use crate::state::pursuit::EgoKeeps;
-use crate::state::trace::Trace;
+use crate::state::trace::traced;
 
 #[derive(Debug, Clone)]
 pub struct Guided {
@@ -86,33 +86,6 @@ impl Guided {
     pub fn station_m(&self) -> f64 {
         self.station_m
     }
-
-    pub fn trace(&self, trace: &mut Trace) {
-        let Guided {
-            station_m,
-            left_m,
-            speed_mps,
-            wants_mps,
-            rate_mps2,
-            shift,
-            meeting,
-            // No tick changes these.
-            way: _,
-            to_middle_m: _,
-            // No tick reads it.
-            late_s: _,
-        } = self;
-        trace.numbers([*station_m, *left_m, *speed_mps, *wants_mps, *rate_mps2]);
-        trace.flags([shift.is_some(), meeting.is_some()]);
-        if let Some(Shift { from_m, to_m, takes_s, since_s }) = *shift {
-            trace.numbers([from_m, to_m, takes_s, since_s]);
-        }
-        // What the ego vehicle has kept moves nothing: only `late_s` comes of it.
-        if let Some(Meeting { ego_m, early_s, reach_m, mps, steady_m, stage, ego_keeps: _ }) = *meeting {
-            trace.word(stage as u64);
-            trace.numbers([ego_m, early_s, reach_m, mps.unwrap_or(f64::INFINITY), steady_m]);
-        }
-    }
 }
 
 /// A move to the side, by the smooth step of least jerk.
@@ -147,4 +120,20 @@ pub enum Stage {
     OnLine,
     /// It has the speed with which it arrives.
     Steady,
+}
+
+traced!(enum Stage);
+
+traced! {
+    Guided {
+        station_m, left_m, speed_mps, wants_mps, rate_mps2, shift, meeting
+    } but {
+        // No tick changes these.
+        way, to_middle_m,
+        // No tick reads it.
+        late_s
+    };
+    Shift { from_m, to_m, takes_s, since_s };
+    // What the ego vehicle has kept moves nothing: only `late_s` comes of it.
+    Meeting { ego_m, early_s, reach_m, mps, steady_m, stage } but { ego_keeps };
 }

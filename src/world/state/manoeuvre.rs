@@ -5,7 +5,7 @@ use std::sync::Arc;
 use avastra_lang::model::command::Command;
 
 use crate::action::Course;
-use crate::state::trace::Trace;
+use crate::state::trace::{Trace, Traced, traced};
 
 /// How far a road user is with a manoeuvre. To be handed over to another one adds that one's phases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
@@ -42,27 +42,6 @@ impl Running {
     pub fn phases(&self) -> u32 {
         self.course.phases() as u32
     }
-
-    pub fn trace(&self, trace: &mut Trace) {
-        let Running { course, phase, stage, since, tracked } = self;
-        trace.words([course.part as u64, *phase as u64, *since, course.arguments().count() as u64]);
-        trace.words(course.arguments());
-        match *stage {
-            Stage::Waiting(held) => trace.words([0, held.map_or(0, |tick| tick + 1)]),
-            Stage::Holding(until) => trace.words([1, until]),
-            Stage::UnderWay(command) => {
-                trace.word(2);
-                trace_command(&command, trace);
-            }
-            Stage::Over => trace.word(3),
-        }
-        trace.flags([tracked.is_some()]);
-        if let Some(Tracked { course, phase, first }) = tracked {
-            trace.words([course.part as u64, *phase as u64, course.arguments().count() as u64]);
-            trace.words(course.arguments());
-            trace_command(first, trace);
-        }
-    }
 }
 
 /// A phase whose speed is told anew in every tick, until another one is told.
@@ -86,37 +65,34 @@ pub enum Stage {
     Over,
 }
 
-/// What was told, as far as it is still asked.
-fn trace_command(command: &Command, trace: &mut Trace) {
-    let Command {
-        speed_mps,
-        rate_mps2,
-        turn,
-        // Whether one of them is said is asked below; how, was handed over to the driver as it was told.
-        lane: _,
-        offset_m: _,
-        keep_m: _,
-        keep_s: _,
-        early_s: _,
-        // These were handed over as they were told.
-        is_continuous: _,
-        aside_mps: _,
-        aside_s: _,
-        time_gap_s: _,
-        to: _,
-        at_m: _,
-        reach_m: _,
-        steady_m: _,
-        ignores: _,
-        siren: _,
-        lights: _,
-    } = command;
-    trace.flags([
-        speed_mps.is_some(),
-        rate_mps2.is_some(),
-        turn.is_some(),
-        command.goes_aside(),
-        command.pursues(),
-    ]);
-    trace.numbers(speed_mps.iter().chain(rate_mps2).copied());
+traced! {
+    Running { course, phase, stage, since, tracked };
+    Tracked { course, phase, first };
+    // Of what was told, what is still asked: the rest was handed over as it was told.
+    Command {
+        speed_mps, rate_mps2, turn => turn.is_some(),
+        lane => lane.is_some(), offset_m => offset_m.is_some(),
+        keep_m => keep_m.is_some(), keep_s => keep_s.is_some(), early_s => early_s.is_some()
+    } but {
+        is_continuous, aside_mps, aside_s, time_gap_s, to, at_m, reach_m, steady_m, ignores, siren, lights
+    };
+}
+
+impl Traced for Course {
+    fn trace(&self, trace: &mut Trace) {
+        // Not which manoeuvre: they are numbered as the space declares them.
+        (self.part, self.arguments().count()).trace(trace);
+        self.arguments().for_each(|argument| trace.word(argument));
+    }
+}
+
+impl Traced for Stage {
+    fn trace(&self, trace: &mut Trace) {
+        match self {
+            Stage::Waiting(held) => (0_u64, *held).trace(trace),
+            Stage::Holding(until) => (1_u64, *until).trace(trace),
+            Stage::UnderWay(command) => (2_u64, *command).trace(trace),
+            Stage::Over => trace.word(3),
+        }
+    }
 }

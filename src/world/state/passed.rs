@@ -3,7 +3,7 @@
 use avastra_base::geometry::OrientedBox;
 use avastra_road::{LaneIndex, RoadMap, SignKind};
 
-use crate::state::trace::Trace;
+use crate::state::trace::traced;
 
 /// What a light showed as a vehicle passed it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,17 +76,6 @@ impl Passed {
         let passed = self.sign.filter(|sign| map.approach(lane).any(|approach| approach == sign.lane));
         passed.map_or(Stop::Ahead, |sign| sign.stood.map_or(Stop::Ran, Stop::Stood))
     }
-
-    /// Signs are left out: what is known of them follows from what was traced before.
-    pub fn trace(&self, trace: &mut Trace) {
-        let Passed { light, sign: _, stand: _ } = self;
-        let code = |light: &PassedLight| match light.shown {
-            Shown::Free => 0,
-            Shown::Red => 1,
-            Shown::LateYellow => 1 << 32,
-        };
-        trace.word(light.as_ref().map_or(0, |light| 2 + 2 * light.signal as u64 + code(light)));
-    }
 }
 
 impl PassedLight {
@@ -106,4 +95,12 @@ pub enum Stop {
     Ran,
     /// It stood before it, since this tick.
     Stood(u64),
+}
+
+traced!(enum Shown);
+
+traced! {
+    // What is known of signs follows from what was traced before.
+    Passed { light } but { sign, stand };
+    PassedLight { signal, shown };
 }

@@ -2,7 +2,7 @@
 
 use avastra_base::geometry::{Pose, Vec2};
 
-use crate::state::trace::Trace;
+use crate::state::trace::traced;
 
 /// What a pedestrian does when a vehicle comes near.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,37 +85,17 @@ impl Walker {
     pub fn is_over(&self) -> bool {
         if self.returns { self.walked_m <= 0.0 } else { self.walked_m >= self.end_m }
     }
+}
 
-    pub fn trace(&self, trace: &mut Trace) {
-        let Walker {
-            meeting,
-            from,
-            way_m,
-            end_m,
-            speed_mps,
-            manner,
-            startle_ticks,
-            walked_m,
-            aside_m,
-            returns,
-            is_told,
-            looks_now,
-            pace_mps,
-            wants_aside_m,
-            begins_tick,
-            begins_tick_max,
-            stuck_ticks,
-            // It follows from where it began.
-            along: _,
-        } = self;
-        trace.flags([*returns, *is_told, *looks_now, meeting.is_some()]);
-        trace.numbers([from.position.x, from.position.y, from.heading_rad]);
-        trace.numbers([*way_m, *end_m, *speed_mps, *walked_m, *aside_m, *pace_mps, *wants_aside_m]);
-        trace.words([*startle_ticks, *stuck_ticks].map(u64::from));
-        trace.words([*begins_tick, *begins_tick_max, *manner as u64]);
-        if let Some(Meeting { station_m, way_m, comes_from_left }) = *meeting {
-            trace.numbers([station_m, way_m]);
-            trace.flags([comes_from_left]);
-        }
-    }
+traced!(enum Manner);
+
+traced! {
+    Walker {
+        meeting, from, way_m, end_m, speed_mps, manner, startle_ticks, walked_m, aside_m, returns, is_told, looks_now, pace_mps,
+        wants_aside_m, begins_tick, begins_tick_max, stuck_ticks
+    } but {
+        // It follows from where it began.
+        along
+    };
+    Meeting { station_m, way_m, comes_from_left };
 }

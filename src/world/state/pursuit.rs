@@ -3,7 +3,7 @@
 use avastra_lang::model::command::Command;
 use avastra_road::LaneIndex;
 
-use crate::state::trace::Trace;
+use crate::state::trace::{Trace, Traced, traced};
 
 #[derive(Debug, Clone, Copy)]
 pub struct Pursuit {
@@ -50,22 +50,6 @@ impl Pursuit {
             ego_keeps: EgoKeeps::default(),
         })
     }
-
-    pub fn trace(&self, trace: &mut Trace) {
-        // By how much it is late moves nothing.
-        let Pursuit { aim, speed_mps_max, crosses_in, is_met, late_s: _, ego_keeps: _ } = *self;
-        let (kind, to, numbers) = match aim {
-            Aim::Gap(Gap::Way(gap_m), to) => (0, to, [gap_m, 0.0]),
-            Aim::Gap(Gap::Time(gap_s), to) => (1, to, [gap_s, 0.0]),
-            Aim::Place { early_s, station_m } => (2, None, [early_s, station_m.unwrap_or(f64::INFINITY)]),
-        };
-        trace.flags([to.is_some(), crosses_in.is_some(), speed_mps_max.is_some(), is_met]);
-        trace.word(kind);
-        trace.words(to.map(u64::from));
-        trace.words(crosses_in.map(|lane| lane.0 as u64));
-        trace.numbers(numbers);
-        trace.numbers(speed_mps_max);
-    }
 }
 
 /// Whether the ego vehicle has kept the speed that it had at the first look, within a tenth and half a metre per second.
@@ -81,5 +65,20 @@ impl EgoKeeps {
         let first_mps = *self.first_mps.get_or_insert(now_mps);
         self.is_lost |= now_mps < standing_mps || (now_mps - first_mps).abs() > 0.1 * first_mps + 0.5;
         !self.is_lost
+    }
+}
+
+traced! {
+    // By how much it is late moves nothing.
+    Pursuit { aim, speed_mps_max, crosses_in, is_met } but { late_s, ego_keeps };
+}
+
+impl Traced for Aim {
+    fn trace(&self, trace: &mut Trace) {
+        match *self {
+            Aim::Gap(Gap::Way(gap_m), to) => (0_u64, (gap_m, to)).trace(trace),
+            Aim::Gap(Gap::Time(gap_s), to) => (1_u64, (gap_s, to)).trace(trace),
+            Aim::Place { early_s, station_m } => (2_u64, (early_s, station_m)).trace(trace),
+        }
     }
 }

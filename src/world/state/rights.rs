@@ -7,7 +7,7 @@ use avastra_road::LaneIndex;
 use crate::state::passed::Passed;
 use crate::state::ruling::{Rule, Ruling};
 use crate::state::time::DT_S;
-use crate::state::trace::Trace;
+use crate::state::trace::{Trace, Traced, traced};
 
 /// What was found holds for so long after the two have left each other's way, s. Ours: outlines that touch behind
 /// a junction do so because of what happened in it.
@@ -42,29 +42,6 @@ impl Rights {
     /// What was found about the two, as long as it holds.
     pub fn held(&self, tick: u64) -> Option<Ruling> {
         self.meeting.filter(|meeting| meeting.holds(tick)).map(|meeting| meeting.ruling)
-    }
-
-    pub fn trace(&self, trace: &mut Trace) {
-        // What was found on the road follows from the pedestrian's position; a rule, its moments and whether a
-        // vehicle waits from what was traced before.
-        let Rights { passed, shares, meeting, wreck, foreseen, left_room, on_road: _ } = self;
-        passed.trace(trace);
-        trace.flags([
-            shares.is_some(),
-            *shares == Some(true),
-            meeting.is_some(),
-            wreck.is_some(),
-            foreseen.is_some(),
-            *left_room,
-        ]);
-        trace.words(wreck.map(|(priority, _)| priority as u64));
-        if let Some(Meeting { place, ruling, tick, waits: _, rests_s: _ }) = *meeting {
-            let (ego, other) = match place {
-                Place::Area(ego, other) => (ego.0 as u64, other.0 as u64),
-                Place::Lane => (u64::MAX, u64::MAX),
-            };
-            trace.words([ego, other, ruling.priority as u64, tick]);
-        }
     }
 }
 
@@ -111,4 +88,23 @@ pub enum Place {
     Area(LaneIndex, LaneIndex),
     /// In a lane, or on foot on the carriageway.
     Lane,
+}
+
+traced! {
+    // What was found on the road follows from the pedestrian's position.
+    Rights { passed, shares, meeting, wreck, left_room, foreseen } but { on_road };
+    // Whether a vehicle waits, and how long it rests, follow from what was traced before.
+    Meeting { place, ruling, tick } but { waits, rests_s };
+    // So do the rule and its moments.
+    Ruling { priority } but { rule, mover, time_s };
+    Foreseen { at, blocks };
+}
+
+impl Traced for Place {
+    fn trace(&self, trace: &mut Trace) {
+        match self {
+            Place::Area(ego, other) => (*ego, *other).trace(trace),
+            Place::Lane => trace.word(u64::MAX),
+        }
+    }
 }

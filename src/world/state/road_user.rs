@@ -11,50 +11,13 @@ use crate::state::obstacle::Obstacle;
 use crate::state::pedestrian::Walker;
 use crate::state::rights::Rights;
 use crate::state::stroller::Stroller;
-use crate::state::trace::Trace;
+use crate::state::trace::{Trace, Traced, traced};
 
 /// One road user of the world.
 #[derive(Debug, Clone)]
 pub struct RoadUser {
     pub obstacle: Obstacle,
     pub mover: Mover,
-}
-
-impl RoadUser {
-    /// Every bit that later ticks depend on.
-    pub fn trace(&self, trace: &mut Trace) {
-        let RoadUser { obstacle, mover } = self;
-        let Obstacle {
-            id,
-            body,
-            colour,
-            verb,
-            outline,
-            velocity_mps,
-            spawned_tick,
-            lights,
-            // These follow from the body, the outline, the way and the ego vehicle, now and in the ticks before.
-            forward: _,
-            height_m: _,
-            lane_heading_rad: _,
-            acceleration_mps2: _,
-            elevation_m: _,
-            is_apart: _,
-            distance_m: _,
-        } = obstacle;
-        trace.words([
-            u64::from(*id),
-            *spawned_tick,
-            *body as u64,
-            *colour as u64,
-            *verb as u64,
-            *lights as u64,
-        ]);
-        let pose = &outline.pose;
-        trace.numbers([pose.position.x, pose.position.y, pose.heading_rad]);
-        trace.numbers([velocity_mps.x, velocity_mps.y]);
-        mover.trace(trace);
-    }
 }
 
 /// The hidden side of a road user.
@@ -70,6 +33,8 @@ pub struct Mover {
     pub rest_ticks: u32,
     /// Part of it that the ego vehicle's sensors saw when they last looked.
     pub visible_fraction: f64,
+    /// How far it is from all others.
+    pub room: Room,
     /// Which of the two has priority: it or the ego vehicle.
     pub rights: Rights,
     /// The name that its action gave it, by index in the space.
@@ -89,6 +54,7 @@ impl Mover {
             crashed_with: None,
             rest_ticks: 0,
             visible_fraction: 1.0,
+            room: Room::default(),
             rights: Rights::default(),
             bearer: None,
             course: None,
@@ -190,39 +156,29 @@ impl Mover {
         }
         self.crashed_with.replace(other)
     }
+}
 
-    pub fn trace(&self, trace: &mut Trace) {
-        let Mover {
-            motion,
-            touched,
-            crashed_with,
-            rest_ticks,
-            visible_fraction,
-            rights,
-            bearer,
-            course,
-            // No tick changes it.
-            size: _,
-            // No tick reads it.
-            phases: _,
-        } = self;
-        // Which name and which manoeuvre is left out: they are numbered as the space declares them, and what is declared beside
-        // them changes no episode.
-        trace.flags([*touched, crashed_with.is_some(), bearer.is_some(), course.is_some()]);
-        trace.words(crashed_with.iter().chain([rest_ticks]).copied().map(u64::from));
-        trace.number(*visible_fraction);
-        if let Some(running) = course {
-            running.trace(trace);
-        }
-        rights.trace(trace);
-        match motion {
-            Motion::Drive(driver) => driver.trace(trace),
-            Motion::Walk(walker) => walker.trace(trace),
-            Motion::Stroll(stroller) => stroller.trace(trace),
-            Motion::Guide(guided) => guided.trace(trace),
-            Motion::Stand => {}
-        }
-    }
+/// Who was near a road user when that was last looked at. Until it and others have come far, it touches nobody else.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Room {
+    /// One bit for each of the first 64 road users, by index: who was near.
+    pub near: u64,
+    /// Least gap between circles around it and around one that was not near, m.
+    pub gap_m: f64,
+    /// [`Travel::done_m`] at that moment.
+    pub since_m: f64,
+    /// How many road users there were, and the ids of the next newcomers, by an action and in ambient traffic: nobody has come or
+    /// gone while all three are the same.
+    pub among: (usize, u32, u32),
+}
+
+/// How far any road user can have come at most.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Travel {
+    /// Over all ticks before this one: the sum of the longest way of each, m.
+    pub done_m: f64,
+    /// The longest way in this tick so far, m.
+    pub now_m: f64,
 }
 
 #[derive(Debug, Clone)]
@@ -232,4 +188,38 @@ pub enum Motion {
     Stroll(Stroller),
     Guide(Guided),
     Stand,
+}
+
+traced! {
+    RoadUser { obstacle, mover };
+    Obstacle {
+        id, body, colour, verb, outline => outline.pose, velocity_mps, spawned_tick, lights
+    } but {
+        // These follow from the body, the outline, the way and the ego vehicle, now and in the ticks before.
+        forward, height_m, lane_heading_rad, acceleration_mps2, elevation_m, is_apart, distance_m
+    };
+    Mover {
+        motion, touched, crashed_with, rest_ticks, visible_fraction, rights,
+        // Not which name: names are numbered as the space declares them, and what is declared beside changes no episode.
+        bearer => bearer.is_some(), course
+    } but {
+        // No tick changes it.
+        size,
+        // It saves work, and changes nothing.
+        room,
+        // No tick reads it.
+        phases
+    };
+}
+
+impl Traced for Motion {
+    fn trace(&self, trace: &mut Trace) {
+        match self {
+            Motion::Drive(driver) => driver.trace(trace),
+            Motion::Walk(walker) => walker.trace(trace),
+            Motion::Stroll(stroller) => stroller.trace(trace),
+            Motion::Guide(guided) => guided.trace(trace),
+            Motion::Stand => {}
+        }
+    }
 }

@@ -14,7 +14,7 @@ use avastra_road::RoadMap;
 
 use super::sensed::SignalColour;
 use super::time::{DT_S, ticks};
-use super::trace::Trace;
+use super::trace::traced;
 
 const GREEN_S: f64 = 12.0;
 const YELLOW_S: f64 = 3.0;
@@ -155,12 +155,11 @@ impl SignalClock {
         let at = (now + all - signal.group as u64 * slot) % all;
         Cycle { at, green, yellow_ends: green + yellow, all }
     }
+}
 
-    pub fn trace(&self, trace: &mut Trace) {
-        // No tick changes the program.
-        let SignalClock { offset_ticks, program: _ } = *self;
-        trace.word(offset_ticks as u64);
-    }
+traced! {
+    // No tick changes the program.
+    SignalClock { offset_ticks => *offset_ticks as u64 } but { program };
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Somebody who walks along the road.
 
-use crate::state::trace::Trace;
+use crate::state::trace::traced;
 
 #[derive(Debug, Clone)]
 pub struct Stroller {
@@ -35,21 +35,11 @@ impl Stroller {
     pub fn is_aside(&self) -> bool {
         self.left_m == self.wants_left_m
     }
+}
 
-    pub fn trace(&self, trace: &mut Trace) {
-        let Stroller {
-            station_m,
-            left_m,
-            speed_mps,
-            wants_left_m,
-            aside_mps,
-            is_oncoming,
-            is_blocked,
-            looks_now,
-            // It follows from the station.
-            height_m: _,
-        } = *self;
-        trace.numbers([station_m, left_m, speed_mps, wants_left_m, aside_mps]);
-        trace.flags([is_oncoming, is_blocked, looks_now]);
-    }
+traced! {
+    // The height follows from the station.
+    Stroller {
+        station_m, left_m, speed_mps, wants_left_m, aside_mps, is_oncoming, is_blocked, looks_now
+    } but { height_m };
 }

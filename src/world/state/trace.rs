@@ -5,6 +5,13 @@
 //! accidents, not to resist forgery: two streams that first differ in one word always have different lanes after it,
 //! because each step of a lane can be undone, and what follows brings them together again by chance of 2⁻⁶⁴ alone.
 
+use std::sync::Arc;
+
+use avastra_base::geometry::{Pose, Vec2};
+use avastra_lang::model::vocabulary::{
+    Body, Colour, LaneChoice, Level, LightColour, Priority, ShownLights, Side, TimeOfDay, Turning, Verb,
+};
+use avastra_road::LaneIndex;
 use sha2::{Digest, Sha256};
 
 /// A word goes to one lane after the other, so that the multiplications overlap.
@@ -43,23 +50,6 @@ impl Trace {
         self.word((number + 0.0).to_bits());
     }
 
-    #[inline]
-    pub fn words(&mut self, words: impl IntoIterator<Item = u64>) {
-        words.into_iter().for_each(|word| self.word(word));
-    }
-
-    #[inline]
-    pub fn numbers(&mut self, numbers: impl IntoIterator<Item = f64>) {
-        numbers.into_iter().for_each(|number| self.number(number));
-    }
-
-    /// Which of up to 64 things there are, in one word: fed before them, it keeps what there is from being taken for what is not.
-    #[inline]
-    pub fn flags<const N: usize>(&mut self, flags: [bool; N]) {
-        const { assert!(N <= 64, "a flag is a bit of a word") };
-        self.word(flags.into_iter().enumerate().fold(0, |bits, (nth, is_so)| bits | u64::from(is_so) << nth));
-    }
-
     /// SHA-256 over what the words up to now left.
     pub fn digest(&self) -> [u8; 32] {
         let mut hash = Sha256::new();
@@ -70,13 +60,113 @@ impl Trace {
     }
 }
 
+/// Stands for what is not there. No number and no count has these bits.
+const NOTHING: u64 = 0x7ff8_7e3d_91a5_0c42;
+
+/// State whose every bit goes into a trace.
+pub trait Traced {
+    fn trace(&self, trace: &mut Trace);
+}
+
+/// Feeds the fields of plain structs to a trace, in this order: all of them, or what stands after `=>` in place of one, but those
+/// that are named after `but`. A field that is forgotten does not compile. `traced!(enum …)`: enums without data.
+macro_rules! traced {
+    (@ $trace:ident, $field:ident) => { $crate::state::trace::Traced::trace($field, $trace) };
+    (@ $trace:ident, $field:ident, $word:expr) => { $crate::state::trace::Traced::trace(&$word, $trace) };
+    (enum $($name:ty),*) => {$(
+        impl $crate::state::trace::Traced for $name {
+            #[inline]
+            fn trace(&self, trace: &mut $crate::state::trace::Trace) {
+                trace.word(*self as u64);
+            }
+        }
+    )*};
+    ($($name:ident { $($field:ident $(=> $word:expr)?),* $(,)? } $(but { $($left:ident),* $(,)? })?;)*) => {$(
+        impl $crate::state::trace::Traced for $name {
+            fn trace(&self, trace: &mut $crate::state::trace::Trace) {
+                let $name { $($field,)* $($($left: _,)*)? } = self;
+                $($crate::state::trace::traced!(@ trace, $field $(, $word)?);)*
+            }
+        }
+    )*};
+}
+pub(crate) use traced;
+
+traced!(enum bool, u8, u32, u64, usize, Body, Colour, LaneChoice, Level, LightColour, Priority, ShownLights, Side, TimeOfDay, Turning, Verb);
+
+traced! {
+    Pose { position, heading_rad };
+}
+
+impl Traced for LaneIndex {
+    fn trace(&self, trace: &mut Trace) {
+        trace.word(self.0 as u64);
+    }
+}
+
+impl Traced for Vec2 {
+    fn trace(&self, trace: &mut Trace) {
+        (self.x, self.y).trace(trace);
+    }
+}
+
+impl<A: Traced, B: Traced> Traced for (A, B) {
+    #[inline]
+    fn trace(&self, trace: &mut Trace) {
+        self.0.trace(trace);
+        self.1.trace(trace);
+    }
+}
+
+impl<T: Traced> Traced for Box<T> {
+    fn trace(&self, trace: &mut Trace) {
+        self.as_ref().trace(trace);
+    }
+}
+
+impl<T: Traced> Traced for Arc<T> {
+    fn trace(&self, trace: &mut Trace) {
+        self.as_ref().trace(trace);
+    }
+}
+
+impl Traced for f64 {
+    #[inline]
+    fn trace(&self, trace: &mut Trace) {
+        trace.number(*self);
+    }
+}
+
+impl<T: Traced> Traced for Option<T> {
+    #[inline]
+    fn trace(&self, trace: &mut Trace) {
+        match self {
+            Some(value) => value.trace(trace),
+            None => trace.word(NOTHING),
+        }
+    }
+}
+
+impl<T: Traced, const N: usize> Traced for [T; N] {
+    fn trace(&self, trace: &mut Trace) {
+        self.iter().for_each(|value| value.trace(trace));
+    }
+}
+
+impl<T: Traced> Traced for Vec<T> {
+    fn trace(&self, trace: &mut Trace) {
+        self.len().trace(trace);
+        self.iter().for_each(|value| value.trace(trace));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn digest(words: &[u64]) -> [u8; 32] {
         let mut trace = Trace::default();
-        trace.words(words.iter().copied());
+        words.iter().for_each(|word| trace.word(*word));
         trace.digest()
     }
 

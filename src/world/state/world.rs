@@ -18,15 +18,15 @@ use crate::state::environment::Environment;
 use crate::state::manoeuvre::PhaseCount;
 use crate::state::obstacle::Obstacle;
 use crate::state::passed::Passed;
-use crate::state::road_user::RoadUser;
+use crate::state::road_user::{RoadUser, Travel};
 use crate::state::sensed::{Conditions, EgoMotion, SignalColour};
 use crate::state::signals::{Colours, SignalClock};
 use crate::state::time::DT_S;
-use crate::state::trace::Trace;
+use crate::state::trace::traced;
 
 /// Name of this simulated world. Raised whenever the same seed no longer gives the same episode and trace, so that an
 /// old scenario is told apart from a refuted one.
-pub const ENGINE: &str = "plane/17";
+pub const ENGINE: &str = "plane/18";
 
 /// A queue before a light is at most this long, m: seven cars.
 const LIGHT_QUEUE_M: f64 = 50.0;
@@ -110,6 +110,7 @@ pub struct World {
     /// In order of appearance.
     pub(crate) users: Vec<RoadUser>,
     pub(crate) next_id: u32,
+    pub(crate) travel: Travel,
     pub(crate) ambient: Ambient,
     pub(crate) traffic: TrafficProfile,
     /// Tick from which time of day and weather may change.
@@ -257,61 +258,6 @@ impl World {
         then.map_or(&self.signals, |(_, clock)| clock).colour(&self.scene.map, signal, tick)
     }
 
-    /// Feeds every bit of the state that later ticks depend on to `trace`, in a fixed order. Here, and for everything that moves,
-    /// a pattern names every field, so that a new one cannot be forgotten.
-    pub fn trace(&self, trace: &mut Trace) {
-        let World {
-            ticks,
-            ego,
-            ego_station_m,
-            ego_offset_m,
-            red_runs,
-            ego_passed,
-            environment,
-            conditions,
-            signals,
-            switch,
-            users,
-            next_id,
-            ambient,
-            weather_tick,
-            seed,
-            reactions,
-            // No tick changes these.
-            scene: _,
-            traffic: _,
-            // It follows from the station, and what is shown from the clock.
-            ego_elevation_m: _,
-            colours: _,
-            // It follows from the contacts, and they from what is traced.
-            pushed_until: _,
-            // No tick reads these.
-            contacts: _,
-            incidents: _,
-            signals_until: _,
-        } = self;
-        trace.word(*ticks);
-        ego.trace(trace);
-        trace.numbers([*ego_station_m, *ego_offset_m]);
-        trace.word(u64::from(*red_runs));
-        ego_passed.trace(trace);
-        environment.trace(trace);
-        // All but the friction follows from the environment.
-        trace.number(conditions.friction);
-        signals.trace(trace);
-        trace.flags([switch.is_some()]);
-        if let Some(Switch { signal, colour, at_m }) = *switch {
-            trace.words([signal as u64, colour as u64]);
-            trace.number(at_m);
-        }
-        trace.word(u64::from(*next_id));
-        ambient.trace(trace);
-        trace.words([*weather_tick, *seed, *reactions, users.len() as u64]);
-        for user in users {
-            user.trace(trace);
-        }
-    }
-
     /// Whether the ego vehicle's front bumper is at most 1 m before the goal, or beyond it.
     pub fn arrived(&self) -> bool {
         self.ego_front_m() >= self.scene.route.goal_m - 1.0
@@ -364,4 +310,25 @@ impl World {
     pub(crate) fn ego_front_m(&self) -> f64 {
         VehicleParameters::MKZ.front_m(self.ego_station_m)
     }
+}
+
+traced! {
+    Switch { signal, colour, at_m };
+    World {
+        ticks, ego, ego_station_m, ego_offset_m, red_runs, ego_passed, environment,
+        // All but the friction follows from the environment.
+        conditions => conditions.friction, signals, switch, users, next_id, ambient, weather_tick, seed,
+        reactions
+    } but {
+        // No tick changes these.
+        scene, traffic,
+        // It follows from the station, and what is shown from the clock.
+        ego_elevation_m, colours,
+        // It follows from the contacts, and they from what is traced.
+        pushed_until,
+        // It saves work, and changes nothing.
+        travel,
+        // No tick reads these.
+        contacts, incidents, signals_until
+    };
 }

@@ -16,9 +16,10 @@ use crate::state::time::DT_S;
 
 /// Obstacles whose gap after a tick is at least this are not checked for contact, m: far more than
 /// rounding.
-const CLOSE_M: f64 = 1e-3;
+pub const CLOSE_M: f64 = 1e-3;
 
 /// A motion that ends at another obstacle.
+#[derive(Debug, PartialEq)]
 pub struct Bump {
     /// Index of that obstacle.
     pub other: usize,
@@ -29,8 +30,9 @@ pub struct Bump {
     pub incident: Incident,
 }
 
-/// The first obstacle in the way when the obstacle at `index` moves to `end`, in the tick after `tick`.
-pub fn bump(users: &[RoadUser], index: usize, end: &Pose, tick: u64) -> Option<Bump> {
+/// The first obstacle in the way when the obstacle at `index` moves to `end`, in the tick after `tick`. Of the first 64 only
+/// those whose bit is set in `near` are looked at.
+pub fn bump(users: &[RoadUser], index: usize, near: u64, end: &Pose, tick: u64) -> Option<Bump> {
     let this = &users[index].obstacle;
     let outline = &this.outline;
     let way = end.position - outline.pose.position;
@@ -44,7 +46,14 @@ pub fn bump(users: &[RoadUser], index: usize, end: &Pose, tick: u64) -> Option<B
     let most_m = way.norm() + turn_rad.abs() * radius_m;
     let reach_m = radius_m + most_m;
     let mut first: Option<(usize, FirstContact)> = None;
-    for (other, RoadUser { obstacle, .. }) in users.iter().enumerate() {
+    let mut rest = near & !(1_u64.checked_shl(index as u32).unwrap_or(0));
+    let listed = core::iter::from_fn(|| {
+        let other = rest.trailing_zeros() as usize;
+        rest &= rest.wrapping_sub(1);
+        (other < users.len().min(64)).then_some(other)
+    });
+    for other in listed.chain(64..users.len()) {
+        let RoadUser { obstacle, .. } = &users[other];
         let near_m = reach_m + obstacle.outline.half_length_m + obstacle.outline.half_width_m;
         let away = obstacle.outline.pose.position - outline.pose.position;
         let is_far = away.x.abs() > near_m || away.y.abs() > near_m;

@@ -13,7 +13,7 @@ mod tests;
 
 use std::sync::Arc;
 
-use avastra_base::geometry::{Frame, Sweep, Vec2};
+use avastra_base::geometry::{Frame, OrientedBox, Pose, Sweep, Vec2, larger, smaller};
 use avastra_lang::model::COMMANDED_MAX;
 use avastra_road::{SignKind, is_apart};
 
@@ -25,18 +25,21 @@ use crate::state::ego::{Ego, VehicleParameters};
 use crate::state::environment::Environment;
 use crate::state::obstacle::Moved;
 use crate::state::passed::Passed;
-use crate::state::road_user::RoadUser;
+use crate::state::road_user::{RoadUser, Room, Travel};
 use crate::state::sensed::SignalColour;
 use crate::state::signals::{Colours, SignalClock};
 use crate::state::time::{DT_S, FRAME_S, FRAME_TICKS, ticks};
 use crate::state::world::{Start, World};
 use crate::step::contact::{Party, meet};
 use crate::step::ego::Control;
-use crate::step::incident::{Bump, bump, exchange, impact};
+use crate::step::incident::{Bump, CLOSE_M, bump, exchange, impact};
 use crate::view::sense::visible_fraction;
 
 /// Added to the way of two bodies before they are taken to be too far apart to touch, m: far more than rounding.
 const NEAR_M: f64 = 1e-3;
+
+/// Road users with a smaller gap between them are looked at in each tick, m: what two at 50 km/h close in 7 ticks.
+const NEARBY_M: f64 = 4.0;
 
 /// How far along the route the ego vehicle is looked for from where it was, m. More than it drives
 /// in a tick, so that it is found again after a corner cut, and less than any loop of a route.
@@ -81,6 +84,7 @@ impl World {
             signals_until: Vec::new(),
             users: Vec::with_capacity(COMMANDED_MAX as usize),
             next_id: 1,
+            travel: Travel::default(),
             ambient: Ambient::new(start.ambient),
             traffic: start.traffic,
             weather_tick: 0,
@@ -129,6 +133,7 @@ impl World {
             }
         }
         self.users = users;
+        self.travel = Travel { done_m: self.travel.done_m + self.travel.now_m, now_m: 0.0 };
         self.measure();
         self.ticks += 1;
         self.colours.pass(&self.signals, &self.scene.map, self.ticks);
@@ -182,7 +187,14 @@ impl World {
         let (user, later) = rest.split_first_mut().expect("the index is that of a user");
         let before = user.obstacle;
         let Some(mut moved) = user.mover.step(&before, &self.around([earlier, later])) else { return false };
-        if let Some(Bump { other, pose, normal, incident }) = bump(users, index, &moved.pose, self.ticks) {
+        let near = self.near(users, index, &moved.pose);
+        let bumped = bump(users, index, near, &moved.pose, self.ticks);
+        debug_assert_eq!(
+            bumped,
+            bump(users, index, u64::MAX, &moved.pose, self.ticks),
+            "somebody near is missed"
+        );
+        if let Some(Bump { other, pose, normal, incident }) = bumped {
             // Obstacles that touch already push where the one that moves goes.
             let pushes = moved.velocity_mps.try_normalize(0.0).unwrap_or(moved.forward);
             let normal = if normal == Vec2::zeros() { pushes } else { normal };
@@ -199,6 +211,8 @@ impl World {
                 self.incidents.push(incident);
             }
         }
+        let way_m = (moved.pose.position - before.outline.pose.position).norm();
+        self.travel.now_m = larger(self.travel.now_m, way_m);
         let RoadUser { obstacle, mover } = &mut users[index];
         let along_mps = |forward: Vec2, velocity_mps: Vec2| forward.dot(&velocity_mps);
         let gained_mps =
@@ -242,6 +256,32 @@ impl World {
         true
     }
 
+    /// The road users that the one at `index` may touch on its way to `end`: one bit for each of the first 64.
+    /// Who stood far apart need not be looked at again until the two can have come together.
+    fn near(&self, users: &mut [RoadUser], index: usize, end: &Pose) -> u64 {
+        let Travel { done_m, now_m } = self.travel;
+        let outline = users[index].obstacle.outline;
+        let way_m = (end.position - outline.pose.position).norm() + CLOSE_M;
+        let among = (users.len(), self.next_id, self.ambient.next_id);
+        let known = users[index].mover.room;
+        if known.among == among && 2.0 * (done_m - known.since_m) + now_m + way_m < known.gap_m {
+            return known.near;
+        }
+        let circle_m = |outline: &OrientedBox| outline.half_length_m + outline.half_width_m;
+        let mut room = Room { near: 0, gap_m: f64::INFINITY, since_m: done_m, among };
+        for (other, RoadUser { obstacle, .. }) in users.iter().enumerate().take(64) {
+            let away = obstacle.outline.pose.position - outline.pose.position;
+            let gap_m = away.norm() - circle_m(&obstacle.outline) - circle_m(&outline);
+            if gap_m < NEARBY_M {
+                room.near |= 1 << other;
+            } else {
+                room.gap_m = smaller(room.gap_m, gap_m);
+            }
+        }
+        users[index].mover.room = room;
+        room.near
+    }
+
     /// Brings the gaps to the ego vehicle up to date.
     fn measure(&mut self) {
         for RoadUser { obstacle, .. } in &mut self.users {
@@ -253,7 +293,8 @@ impl World {
     /// Brings up to date what is seen along the lines of sight from the ego vehicle's roof.
     fn look(&mut self) {
         let eye = self.ego.outline.pose.position;
-        for index in 0..self.users.len() {
+        let has_levels = self.scene.map.has_levels;
+        for index in 0..if has_levels { self.users.len() } else { 0 } {
             self.users[index].obstacle.is_apart = self.alone().is_apart_from_ego(&self.users[index]);
         }
         for index in 0..self.users.len() {

@@ -31,8 +31,8 @@ pub fn visible_fraction<'a>(
     let hides = |other: &&Obstacle| {
         other.id != target.id && may_hide(eye, towards, distance_m, radius_m, &other.outline)
     };
-    let hiders: Vec<&Obstacle> = obstacles.filter(hides).collect();
-    if hiders.is_empty() {
+    let mut hiders = obstacles.filter(hides).peekable();
+    if hiders.peek().is_none() {
         return 1.0;
     }
     let (first, last) = silhouette(eye, towards, target);
@@ -62,9 +62,13 @@ fn may_hide(eye: Vec2, towards: Vec2, distance_m: f64, target_m: f64, other: &Or
     if ahead_m >= distance_m + target_m {
         return false;
     }
-    let radius_m = other.radius_m();
     let aside_m = (towards.x * delta.y - towards.y * delta.x).abs() / distance_m;
-    ahead_m > -radius_m && aside_m < radius_m + target_m * larger(ahead_m / distance_m, 0.0)
+    let room_m = aside_m - target_m * larger(ahead_m / distance_m, 0.0);
+    // Most are so far aside that their circle need not be worked out.
+    room_m < other.half_length_m + other.half_width_m && {
+        let radius_m = other.radius_m();
+        ahead_m > -radius_m && room_m < radius_m
+    }
 }
 
 /// The outermost corners of an outline as seen from a point: left and right of the line to it.

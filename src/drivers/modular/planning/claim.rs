@@ -81,8 +81,7 @@ impl Claim {
         let mut claim = Claim::empty(forecast);
         let mut forward = forecast.forward;
         let reach_m = half_way_m + lateral.offset_m_max() + (forecast.length_m + forecast.width_m) / 2.0;
-        let (now, mut tracer) =
-            guide.trace(forecast.positions[0], ahead.start - BEHIND_M, ahead.end, reach_m);
+        let mut tracer = guide.trace(forecast.positions[0], ahead.start - BEHIND_M, ahead.end, reach_m);
         for step in 0..=STEPS {
             if step > 0 && !forecast.moving {
                 claim.spans[step] = claim.spans[0];
@@ -92,7 +91,8 @@ impl Claim {
             if step > 0 {
                 forward = direction(position - forecast.positions[step - 1], forward);
             }
-            let on_guide = if step == 0 { Some(now) } else { tracer.next(position) };
+            let on_guide =
+                if step == 0 { tracer.here().or_else(|| tracer.behind()) } else { tracer.next(position) };
             let taken = on_guide.and_then(|on_guide| {
                 let offset_m = on_guide.offset_m - lateral.aside(on_guide.station_m).offset_m;
                 let beside = Beside { offset_m, ..on_guide };

@@ -243,37 +243,48 @@ impl Course {
         let mut walk = Walk::new();
         for (step, (position, &station_m)) in positions.iter_mut().zip(stations_m).enumerate() {
             let time_s = step as f64 * STEP_S;
-            let (a, b, past_m) = walk.to(map, self, station_m);
-            let along = (b.position - a.position) / (b.station_m - a.station_m);
+            let (Segment { begin, along, .. }, past_m) = walk.to(map, self, station_m);
             let kept = if returns { (1.0 - time_s / RETURN_S).max(0.0) } else { 1.0 };
             let offset_m = self.offset_m * kept + (lateral_mps * time_s).clamp(-drift_m_max, drift_m_max);
-            *position = a.position + along * past_m + Vec2::new(-along.y, along.x) * offset_m;
+            *position = begin.position + along * past_m + Vec2::new(-along.y, along.x) * offset_m;
         }
     }
 }
 
 /// A place that moves on along a course from lane to lane.
 #[derive(Debug)]
-pub struct Walk {
+pub struct Walk<'a> {
     /// Index of the lane among the course's, and where it begins from the vehicle's first lane on, m.
     lane: usize,
     begin_m: f64,
+    /// Where it was last.
+    segment: Option<Segment<'a>>,
 }
 
-impl Walk {
-    pub fn new() -> Walk {
-        Walk { lane: 0, begin_m: 0.0 }
+/// The piece of a lane's centre between two of its vertices.
+#[derive(Debug, Clone, Copy)]
+pub struct Segment<'a> {
+    pub begin: &'a PathPoint,
+    /// Unit vector to the next vertex.
+    pub along: Vec2,
+    /// Station of the next vertex, m.
+    to_m: f64,
+}
+
+impl<'a> Walk<'a> {
+    pub fn new() -> Walk<'a> {
+        Walk { lane: 0, begin_m: 0.0, segment: None }
     }
 
-    /// The vertices around the place `ahead_m` ahead of the vehicle, and how far beyond the first of them
-    /// it is, m. Beyond the end of the course it is on the tangent. Places must not go back.
-    pub fn to<'a>(
-        &mut self,
-        map: &'a RoadMap,
-        course: &Course,
-        ahead_m: f64,
-    ) -> (&'a PathPoint, &'a PathPoint, f64) {
+    /// The segment at the place `ahead_m` ahead of the vehicle, and how far beyond its first vertex that
+    /// is, m. Beyond the end of the course it is on the tangent. Places must not go back.
+    pub fn to(&mut self, map: &'a RoadMap, course: &Course, ahead_m: f64) -> (Segment<'a>, f64) {
         let station_m = course.station_m + ahead_m;
+        if let Some(segment) = &self.segment
+            && station_m - self.begin_m < segment.to_m
+        {
+            return (*segment, station_m - self.begin_m - segment.begin.station_m);
+        }
         let mut centre = &map.lane(course.lanes[self.lane]).centre;
         while self.lane + 1 < course.count && station_m - self.begin_m > centre.length_m() {
             self.begin_m += centre.length_m();
@@ -281,7 +292,10 @@ impl Walk {
             centre = &map.lane(course.lanes[self.lane]).centre;
         }
         let on_lane_m = station_m - self.begin_m;
-        let (a, b) = centre.segment_at(on_lane_m);
-        (a, b, on_lane_m - a.station_m)
+        let (begin, end) = centre.segment_at(on_lane_m);
+        let along = (end.position - begin.position) / (end.station_m - begin.station_m);
+        let segment = Segment { begin, along, to_m: end.station_m };
+        self.segment = Some(segment);
+        (segment, on_lane_m - begin.station_m)
     }
 }

@@ -61,8 +61,8 @@ pub fn roll(map: &RoadMap, course: &Course, motion: &Motion, stations_m: &mut [f
         let mut wanted_mps2 = motion.acceleration_mps2 * larger(1.0 - time_s / FADE_S, 0.0);
         // Until it accelerates of itself, the vehicle is not predicted to. Most courses have no bend that matters.
         if sharpest_mps < speed_mps {
-            let (a, _, _) = ahead.to(map, course, gone_m + speed_mps * BEND_S);
-            let bend_mps = bend_mps(a.curvature_per_m.abs());
+            let (segment, _) = ahead.to(map, course, gone_m + speed_mps * BEND_S);
+            let bend_mps = bend_mps(segment.begin.curvature_per_m.abs());
             if bend_mps < speed_mps {
                 wanted_mps2 = smaller(wanted_mps2, larger((bend_mps - speed_mps) / BEND_S, -BEND_MPS2));
             }

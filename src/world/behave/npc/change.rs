@@ -276,16 +276,16 @@ impl Driver {
     /// Where it is after a tick in which it drove `way_m`, with the lane change under way moved on. `before`
     /// is where its centre was.
     pub fn advance_change(&mut self, way_m: f64, before: Vec2, size: &BodyParameters) -> Moved {
-        let from = body_at(&self.way.path, self.station_m, size);
+        let (from, wheelbase) = body_at(&self.way.path, self.station_m, size);
         // The velocity is measured, because in a bend the centre of a body is slower than its way, and
         // between two lanes it has neither lane's speed.
         let at = |pose: Pose, lane_heading_rad| Moved {
             pose,
-            forward: pose.forward(),
+            forward: if pose.heading_rad == from.heading_rad { wheelbase.forward } else { pose.forward() },
             lane_heading_rad,
             velocity_mps: (pose.position - before) / DT_S,
         };
-        let from_lane_rad = self.lane_heading_rad();
+        let from_lane_rad = if wheelbase.is_straight { from.heading_rad } else { self.lane_heading_rad() };
         let aside_m = self.aside_m();
         let Some(change) = &mut self.change else {
             return at(self.moved_aside(from, way_m), from_lane_rad);
@@ -295,7 +295,7 @@ impl Driver {
         let guess_m = change.to_station_m + way_m;
         change.to_station_m =
             change.to.path.project_from(from.position, guess_m).map_or(guess_m, |found| found.station_m);
-        let to = beside(body_at(&change.to.path, change.to_station_m, size), change.ends_m);
+        let to = beside(body_at(&change.to.path, change.to_station_m, size).0, change.ends_m);
         let to_lane_rad = change.to.path.heading_at(change.to_station_m);
         change.advance(way_m, self.speed_mps);
         if change.is_over() {

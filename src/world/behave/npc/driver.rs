@@ -7,6 +7,7 @@
 //! they slow down for bends, stop at red lights and stop signs (`stop_line`) and follow. What else they do to the ego
 //! vehicle is the scenario's business.
 
+use avastra_base::geometry::smaller;
 use avastra_base::kinematics::STANDING_MPS;
 use avastra_base::rng::Rng;
 use avastra_lang::model::vocabulary::TrafficRule;
@@ -119,7 +120,7 @@ impl Driver {
             end_m.map(|end_m| end_m - front_m),
             self.hold_m.map(|hold_m| hold_m - front_m),
         ];
-        let line_ahead_m = line_ahead_m.into_iter().flatten().fold(f64::INFINITY, f64::min);
+        let line_ahead_m = line_ahead_m.into_iter().flatten().fold(f64::INFINITY, smaller);
         let is_free = self.leader.is_none() && line_ahead_m == f64::INFINITY;
         let is_told = self.ordered_mps2.is_some() || pursued_mps2.is_some();
         if around.traffic.rays && !(is_free && is_told) {

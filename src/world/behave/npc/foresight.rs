@@ -46,7 +46,7 @@ impl Driver {
         let speed_mps = self.speed_mps.max(CREEP_MPS);
         let own = LazyCell::new(|| {
             MOMENTS_S.map(|time_s| {
-                self.beside_way(body_at(&self.way.path, self.station_m + speed_mps * time_s, size))
+                self.beside_way(body_at(&self.way.path, self.station_m + speed_mps * time_s, size).0)
             })
         });
         let mut free_m = f64::INFINITY;
@@ -65,7 +65,7 @@ impl Driver {
             }
             let other = |time_s| {
                 let station_m = driver.station_m + driver.speed_mps * time_s;
-                driver.beside_way(body_at(&driver.way.path, station_m, body))
+                driver.beside_way(body_at(&driver.way.path, station_m, body).0)
             };
             free_m = free_m.min(free_way_m(this, &own, speed_mps, &obstacle.outline, other));
         }

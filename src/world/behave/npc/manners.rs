@@ -26,8 +26,10 @@ use core::cell::LazyCell;
 
 use crate::behave::npc::figures::{COMFORT_MPS2, GAP_M_MIN, LOOK_AHEAD_M};
 use crate::scene::junction::Area;
+use crate::scene::way::LaneSet;
 use crate::state::driver::Driver;
 use crate::state::ego::VehicleParameters;
+use crate::state::obstacle::Obstacle;
 use crate::state::sensed::SignalColour;
 use crate::state::time::DT_S;
 use crate::view::around::{Around, View};
@@ -130,7 +132,14 @@ impl Driver {
         let areas = &self.way.areas;
         let open = areas.partition_point(|area| area.from_m <= front_m);
         let near = |area: &&Area| area.from_m <= front_m + reach_m;
-        let waited_for = areas[open..].iter().take_while(near).position(|area| self.must_wait(area, view))?;
+        let near_areas = || areas[open..].iter().take_while(near);
+        let lanes = near_areas().fold(LaneSet::default(), |lanes, area| lanes.with(area.other));
+        // Most often nobody comes near on any of their lanes.
+        let minds_others = !self.ignores.contains(TrafficRule::Others)
+            && view.around.drivers().any(|(obstacle, _, driver)| {
+                driver.way.lane_set.may_meet(lanes) && is_near(obstacle, view.this)
+            });
+        let waited_for = near_areas().position(|area| self.must_wait(area, minds_others, view))?;
         // It must not wait in an earlier area either, unless its front is in that already.
         let mut hold_m = areas[open + waited_for].from_m;
         for area in areas[open..open + waited_for].iter().rev() {
@@ -148,23 +157,17 @@ impl Driver {
         ahead.fold(f64::NEG_INFINITY, |end_m, area| end_m.max(area.to_m))
     }
 
-    fn must_wait(&self, area: &Area, &View { this, size, around }: &View) -> bool {
+    fn must_wait(&self, area: &Area, minds_others: bool, &View { this, size, around }: &View) -> bool {
         if self.would_stop_in(area, size) {
             return true;
         }
         // Worked out only if needed: most areas are on no other vehicle's way.
         let own = LazyCell::new(|| self.passage(area.from_m, area.to_m, size, around));
         let impatient = f64::from(self.waited_ticks) * DT_S >= PATIENCE_S;
-        let minds_others = !self.ignores.contains(TrafficRule::Others);
         let for_others = minds_others
             && around.drivers().any(|(obstacle, body, driver)| {
                 // Most others take no lane that meets this area.
-                if !driver.way.may_take(area.other) {
-                    return false;
-                }
-                let reach_m = APPROACH_M + JUNCTION_M;
-                let away = obstacle.outline.pose.position - this.outline.pose.position;
-                if away.norm_squared() > reach_m * reach_m {
+                if !driver.way.may_take(area.other) || !is_near(obstacle, this) {
                     return false;
                 }
                 let other = driver.passage_through(area, body, around);
@@ -216,6 +219,12 @@ impl Driver {
         let begin_m = self.way.lane_ahead_m(area.other, self.station_m - size.length_m / 2.0)?;
         Some(self.passage(begin_m + area.other_from_m, begin_m + area.other_to_m, size, around))
     }
+}
+
+/// Whether another vehicle is so near that it may matter at the junction ahead.
+fn is_near(other: &Obstacle, this: &Obstacle) -> bool {
+    let reach_m = APPROACH_M + JUNCTION_M;
+    (other.outline.pose.position - this.outline.pose.position).norm_squared() <= reach_m * reach_m
 }
 
 /// The ego vehicle's passage along its route, as ambient vehicles expect it.

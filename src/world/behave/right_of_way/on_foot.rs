@@ -5,7 +5,7 @@ use avastra_base::kinematics::CAREFUL_BRAKING_MPS2;
 use avastra_lang::model::vocabulary::{Body, Priority};
 use avastra_road::{RouteLane, StopLine};
 
-use crate::behave::right_of_way::room::{APPROACH_M, allowed_mps, can_stop};
+use crate::behave::right_of_way::room::{allowed_mps, can_stop};
 use crate::behave::right_of_way::side::OVER_M;
 use crate::behave::right_of_way::turning::TURNS_RAD;
 use crate::state::ego::VehicleParameters;
@@ -36,8 +36,10 @@ impl Strip {
     pub fn of(this: &Obstacle, around: &Around) -> Strip {
         let route = &around.scene.route;
         let position = this.outline.pose.position;
-        // Along a turn the way to it is longer than the distance.
-        let found = route.path.project_near(position, around.ego_station_m, 2.0 * APPROACH_M);
+        // In bends the way to it is longer than the distance; farther along the route another branch passes it.
+        let away_m = (position - around.ego.rear_axle.position).norm();
+        let reach_m = 2.0 * away_m + around.ego_offset_m.abs();
+        let found = route.path.project_near(position, around.ego_station_m, reach_m);
         let ego = route.path.project_near(around.ego_outline.pose.position, around.ego_station_m, 10.0);
         let half_m = this.outline.half_length_m;
         Strip {

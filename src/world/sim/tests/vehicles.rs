@@ -34,7 +34,7 @@ fn a_bus_in_a_bend_keeps_its_tail_near_its_lane() {
     };
     for (radius_m, most_m) in [(7.0, 1.25), (10.0, 1.0)] {
         let about_its_centre = sweep_m(radius_m, |path, station_m, _| path.pose_at(station_m));
-        let on_its_axles = sweep_m(radius_m, body_at);
+        let on_its_axles = sweep_m(radius_m, |path, station_m, body| body_at(path, station_m, body).0);
         assert!(on_its_axles < most_m, "{on_its_axles}");
         assert!(on_its_axles < 0.8 * about_its_centre, "{on_its_axles} {about_its_centre}");
     }
