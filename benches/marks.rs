@@ -36,7 +36,7 @@ use avastra::mdp::ProcKind;
 use avastra::model::Space;
 use avastra::model::command::IgnoredRules;
 use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, ShownLights, Side, Then, TimeOfDay, Verb};
-use avastra::run::{Arena, Run, RunSettings};
+use avastra::run::{Arena, Conditions, Run, RunSettings};
 use avastra::sim::{Scene, Sensed, Start, TrafficProfile, World};
 use avastra::{ads, episode};
 
@@ -324,29 +324,8 @@ impl Attached {
 }
 
 fn run(space: Arc<Space>) -> Run {
-    let settings = RunSettings {
-        rows: 0,
-        replays: 0,
-        keep: 0,
-        avastra: String::new(),
-        engine: String::new(),
-        space: String::new(),
-        space_digest: String::new(),
-        roads: vec![space.roads[0].name.clone()],
-        ads: "modular".to_owned(),
-        profile: None,
-        external: None,
-        agent: "random".to_owned(),
-        policy: None,
-        episodes: EPISODES,
-        seed: 1,
-        ambient: 0,
-        traffic: None,
-        causes: false,
-        without: Vec::new(),
-        with: Vec::new(),
-        avoidability: Default::default(),
-    };
+    let conditions = Conditions { roads: vec![space.roads[0].name.clone()], ..Conditions::of(&space) };
+    let settings = RunSettings::new(conditions, "random", EPISODES, 1);
     Run::new(ActionTable::new(space), settings).expect("the settings name what exists")
 }
 

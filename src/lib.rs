@@ -11,14 +11,15 @@
 //!
 //! use avastra::action::ActionTable;
 //! use avastra::check::{ReadError, load};
-//! use avastra::run::{Run, RunSettings};
+//! use avastra::run::{Conditions, Run, RunSettings};
 //!
 //! let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
 //! let loaded = load(Path::new("scenarios/avastra45.ava"), &read)?;
 //! let space = loaded.space.expect("it has no mistakes");
 //!
 //! // One episode of random search at the corner, with seed 1, against the default driving system.
-//! let settings = RunSettings { roads: vec!["corner".to_owned()], ..RunSettings::new(&space, "random", 1, 1) };
+//! let conditions = Conditions { roads: vec!["corner".to_owned()], ..Conditions::of(&space) };
+//! let settings = RunSettings::new(conditions, "random", 1, 1);
 //! let run = Run::new(ActionTable::new(space), settings)?;
 //! let (summary, log) = run.judged(0);
 //! assert_eq!(log.road, "corner");

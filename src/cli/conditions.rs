@@ -1,6 +1,6 @@
 //! The settings of episodes that a command line asks for: who drives, where, under which conditions.
 
-use avastra_campaign::run::{Profile, Run, RunSettings, TrafficRecord};
+use avastra_campaign::run::{Conditions, Profile, Run, RunSettings, TrafficRecord};
 use avastra_lang::model::Space;
 
 use super::arguments::ConditionArguments;
@@ -17,7 +17,7 @@ pub fn settings(
 ) -> Result<RunSettings, Failure> {
     let traffic = arguments.traffic.as_deref().map(load::traffic).transpose()?;
     let UnderTest { ads, profile, external } = under_test;
-    Ok(RunSettings {
+    let conditions = Conditions {
         roads: roads_or_all(&arguments.road, space),
         ads,
         profile,
@@ -26,13 +26,14 @@ pub fn settings(
         traffic: traffic.as_ref().and_then(TrafficRecord::new),
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
-        ..RunSettings::new(space, agent, episodes, arguments.seed)
-    })
+        ..Conditions::of(space)
+    };
+    Ok(RunSettings::new(conditions, agent, episodes, arguments.seed))
 }
 
 /// On which roads fewer vehicles of ambient traffic are there at the start than were asked for; nothing if all are.
 pub fn ambient_text(run: &Run) -> Option<String> {
-    let wanted = run.settings().ambient;
+    let wanted = run.settings().conditions.ambient;
     if wanted == 0 {
         return None;
     }

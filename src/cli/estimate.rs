@@ -190,7 +190,7 @@ fn at_look(
     look: u32,
 ) -> Result<Looked, DatabaseError> {
     let (mut records, mut events) = (database.parts()?, database.events()?);
-    let is_known = |part: &Part| part.road < settings.run.roads.len();
+    let is_known = |part: &Part| part.road < settings.run.conditions.roads.len();
     if !records.iter().all(|record| is_known(&record.part))
         || events.iter().any(|(_, event)| event.row.is_some_and(|row| row >= labels.len()))
     {
@@ -235,8 +235,9 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
         remarks.extend(run_directory::foreign_text(&EstimateSettings::KIND, directory, &written));
     }
     remarks.extend(run_directory::remark_on_copy(directory));
-    let table = load::table(&Output::silent(), &directory.join(&settings.run.space)).ok();
-    let is_it = |table: &ActionTable| table.space().meaning.is_sealed_by(&settings.run.space_digest);
+    let table = load::table(&Output::silent(), &directory.join(&settings.run.conditions.space)).ok();
+    let is_it =
+        |table: &ActionTable| table.space().meaning.is_sealed_by(&settings.run.conditions.space_digest);
     let labels: Vec<String> = match table.filter(is_it) {
         Some(table) => table.rows().iter().map(|row| row.label.clone()).collect(),
         None => {
@@ -263,7 +264,7 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
     let mut looks = settings.looks().into_iter();
     while let Some(look) = looks.next() {
         let looked = at_look(&settings, &database, &pilot, &labels, look).map_err(unread)?;
-        let is_whole = looked.parts.len() == look as usize * settings.run.roads.len();
+        let is_whole = looked.parts.len() == look as usize * settings.run.conditions.roads.len();
         // A look may lack parts, because they are damaged or another shard's. Then later parts were played, too, so go on.
         let is_last = looked.parts.len() == all || (is_whole && looked.is_enough);
         results = Some(looked.results);
@@ -337,8 +338,8 @@ fn write_scenarios(
     directory: &Path,
     played: &Played,
 ) -> Result<Vec<Option<(String, String)>>, Failure> {
-    let RunSettings { agent, without, with, .. } = &estimate.settings().run;
-    let player = Player { command: "estimate", table: estimate.run().table(), agent, without, with };
+    let RunSettings { agent, conditions, .. } = &estimate.settings().run;
+    let player = Player { command: "estimate", table: estimate.run().table(), agent, conditions };
     let critical = directory.join("critical");
     let write_one = |met: &Met| {
         // Of breaches there is a scenario only where they are asked for.
@@ -454,10 +455,10 @@ fn heading(estimate: &Estimate) -> String {
         settings.event.in_words(),
         settings.run.agent,
         estimate.run().arena().ads_name(),
-        profile_text(settings.run.profile.as_ref()),
+        profile_text(settings.run.conditions.profile.as_ref()),
         plural(settings.parts as usize, "part"),
         plural(settings.run.episodes as usize, "episode"),
-        settings.run.roads.join(", "),
+        settings.run.conditions.roads.join(", "),
         settings.run.seed
     )
 }

@@ -230,10 +230,6 @@ fn of_run(
     asked: &[String],
     found: &mut Found,
 ) -> Result<Vec<String>, Failure> {
-    #[derive(serde::Deserialize)]
-    struct Begun {
-        space: PathBuf,
-    }
     let path = directory.join("run.db");
     if let Some(how) = run_directory::lost(&path) {
         return Ok(vec![format!("`{}` is {how}: only scenarios are shown", path.shown())]);
@@ -257,7 +253,7 @@ fn of_run(
         remarks.extend(run_directory::foreign_text(&kind, directory, &written));
     }
     remarks.extend(run_directory::remark_on_copy(directory));
-    let space = serde_yaml::from_str::<Begun>(settings).ok().map(|begun| directory.join(begun.space));
+    let space = run_directory::begun_in(settings).map(|begun| directory.join(begun.space));
     // A page of what was found is worth having without the names of the rows.
     let table: Option<ActionTable> = space.and_then(|space| load::table(output, &space).ok());
     if table.is_none() {

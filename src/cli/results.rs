@@ -107,8 +107,8 @@ fn chapter_of<'a>(
 /// The same without the paths of the machine that played it.
 fn as_from_file(played: Played, chapter: &Chapter) -> Played {
     let mut settings = played.settings;
-    settings.space = chapter.file.space.clone();
-    if let Some(attached) = &mut settings.external {
+    settings.conditions.space = chapter.file.space.clone();
+    if let Some(attached) = &mut settings.conditions.external {
         attached.settings.working_directory = None;
     }
     Played { settings, ..played }

@@ -11,8 +11,8 @@ use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::oracle;
 use avastra_campaign::oracle::mixed_text;
 use avastra_campaign::run::{
-    DEFAULT_ADS, Database, DatabaseError, EpisodeSummary, FoundIn, Group, Numbered, PolicyReference,
-    RefusalCount, RequirementCount, Run, RunSettings, Totals, TrafficRecord, play,
+    Conditions, DEFAULT_ADS, Database, DatabaseError, EpisodeSummary, FoundIn, Group, Numbered,
+    PolicyReference, RefusalCount, RequirementCount, Run, RunSettings, Totals, TrafficRecord, play,
 };
 use avastra_drivers::ModularConfig;
 use avastra_drivers::external::{Conversation, Problem};
@@ -62,7 +62,7 @@ impl Campaign for RunSettings {
     type Database = Database;
 
     fn outside(&mut self) -> Outside<'_> {
-        let RunSettings { space, space_digest, external, policy, .. } = self;
+        let RunSettings { conditions: Conditions { space, space_digest, external, .. }, policy, .. } = self;
         Outside { space, space_digest, external, policy: Some(policy) }
     }
 }
@@ -346,8 +346,8 @@ fn keep(
     summary: &EpisodeSummary,
     log: &EpisodeLog,
 ) -> Result<(), Failure> {
-    let RunSettings { agent, without, with, .. } = run.settings();
-    let player = Player { command: "run", table: run.table(), agent, without, with };
+    let RunSettings { agent, conditions, .. } = run.settings();
+    let player = Player { command: "run", table: run.table(), agent, conditions };
     let is_critical = summary.counted() > 0 || !log.breaches.is_empty();
     let scenario = is_critical.then(|| directory.write_critical(&player, (log, summary))).transpose()?;
     directory.write_failure(&player, (log, summary))?;
@@ -359,11 +359,11 @@ fn keep(
 /// Writes the episodes without a finding that are to be kept. An attached driving system that cannot be started drives none of
 /// them again.
 fn keep_near(run: &Run, directory: &Directory) -> Result<Vec<PathBuf>, Failure> {
-    let RunSettings { agent, without, with, keep, .. } = run.settings();
+    let RunSettings { agent, conditions, keep, .. } = run.settings();
     if *keep == 0 || !oracle::can_replay(run.arena().ads()) {
         return Ok(Vec::new());
     }
-    let player = Player { command: "run", table: run.table(), agent, without, with };
+    let player = Player { command: "run", table: run.table(), agent, conditions };
     let near = directory.read(|database| database.near(*keep as usize))?;
     near.iter()
         .map(|near| {
@@ -377,40 +377,45 @@ fn keep_near(run: &Run, directory: &Directory) -> Result<Vec<PathBuf>, Failure> 
 fn trained_elsewhere(policy: &Policy, run: &Run) -> Option<String> {
     let (origin, settings) = (&policy.origin, run.settings());
     let mut told = Vec::new();
-    let roads: Vec<&str> =
-        settings.roads.iter().filter(|road| !origin.roads.contains(road)).map(String::as_str).collect();
+    let roads: Vec<&str> = settings
+        .conditions
+        .roads
+        .iter()
+        .filter(|road| !origin.roads.contains(road))
+        .map(String::as_str)
+        .collect();
     if !roads.is_empty() {
         told.push(format!("on {}, and plays on {}", origin.roads.join(", "), roads.join(", ")));
     }
     // A profile that is not recorded is the default.
     let usual = || (origin.ads == DEFAULT_ADS).then(|| ModularConfig::default().digest());
     let trained = origin.profile_digest.clone().or_else(usual);
-    let profile = settings.profile.as_ref().map(|profile| profile.digest.clone());
+    let profile = settings.conditions.profile.as_ref().map(|profile| profile.digest.clone());
     let now = run.arena().attached().map(|attached| attached.digest()).or(profile).or_else(usual);
-    if settings.ads != origin.ads {
+    if settings.conditions.ads != origin.ads {
         told.push(format!("against {}, and plays against {}", origin.ads, run.arena().ads_name()));
     } else if trained != now {
         let how =
             |line: Option<&str>| line.map_or("its default profile".to_owned(), |line| format!("`{line}`"));
-        let line = settings.profile.as_ref().map(|profile| profile.settings.to_line());
+        let line = settings.conditions.profile.as_ref().map(|profile| profile.settings.to_line());
         let line =
             line.filter(|line| !line.is_empty()).or_else(|| run.arena().attached().map(|of| of.to_line()));
         let (before, after) = (how(origin.profile.as_deref()), how(line.as_deref()));
         told.push(format!("against {} with {before}, and plays against it with {after}", origin.ads));
     }
-    let traffic = settings.traffic.as_ref().map(TrafficRecord::in_words);
+    let traffic = settings.conditions.traffic.as_ref().map(TrafficRecord::in_words);
     if traffic != origin.traffic {
         let usual = || "the usual".to_owned();
         let (before, after) = (origin.traffic.clone().unwrap_or_else(usual), traffic.unwrap_or_else(usual));
         told.push(format!("with traffic {before}, and plays with {after}"));
     }
-    if settings.ambient > 0 {
-        let vehicles = plural(settings.ambient as usize, "vehicle");
+    if settings.conditions.ambient > 0 {
+        let vehicles = plural(settings.conditions.ambient as usize, "vehicle");
         told.push(format!("without ambient traffic, and plays among {vehicles} of it"));
     }
     for (how, none, before, now) in [
-        ("with", "with no optional rule", &origin.with, &settings.with),
-        ("without", "with every standard rule", &origin.without, &settings.without),
+        ("with", "with no optional rule", &origin.with, &settings.conditions.with),
+        ("without", "with every standard rule", &origin.without, &settings.conditions.without),
     ] {
         if before != now {
             let rules = |names: &[String]| match names {
@@ -427,21 +432,24 @@ fn trained_elsewhere(policy: &Policy, run: &Run) -> Option<String> {
 
 fn heading(run: &Run) -> String {
     let settings = run.settings();
-    let ambient = match settings.ambient {
+    let ambient = match settings.conditions.ambient {
         0 => String::new(),
         wanted => format!(", {} of ambient traffic", plural(wanted as usize, "vehicle")),
     };
-    let traffic =
-        settings.traffic.as_ref().map_or(String::new(), |record| format!(", traffic {}", record.in_words()));
+    let traffic = settings
+        .conditions
+        .traffic
+        .as_ref()
+        .map_or(String::new(), |record| format!(", traffic {}", record.in_words()));
     let ads = run.arena().ads_name();
     format!(
         "{}: {} against {}{}, {} on {}{ambient}{traffic}, seed {}",
         run.space().path.shown(),
         settings.agent,
         ads,
-        profile_text(settings.profile.as_ref()),
+        profile_text(settings.conditions.profile.as_ref()),
         plural(if settings.rows > 0 { run.episodes() } else { settings.episodes as usize }, "episode"),
-        settings.roads.join(", "),
+        settings.conditions.roads.join(", "),
         settings.seed
     )
 }

@@ -17,7 +17,7 @@ use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::files::{self, Lock};
 use avastra_campaign::oracle::Found;
 use avastra_campaign::run::{
-    DatabaseError, EpisodeSummary, Near, Numbered, Shard, Units, VERSION, WrittenScenario,
+    Conditions, DatabaseError, EpisodeSummary, Near, Numbered, Shard, Units, VERSION, WrittenScenario,
 };
 use avastra_drivers::external::{Attached, ExternalSettings};
 use avastra_lang::check::normal;
@@ -109,11 +109,29 @@ pub fn from_record(directory: &Path, attached: Attached) -> Attached {
     Attached { settings: ExternalSettings { working_directory, ..attached.settings }, ..attached }
 }
 
-/// What every kind of settings begins with.
+/// What every kind of settings begins with, and from where it is read.
 #[derive(serde::Deserialize)]
-struct Begun {
+pub struct Begun {
     avastra: String,
     engine: String,
+    pub space: String,
+    space_digest: String,
+}
+
+/// Settings of this version or of an earlier one, which had no `conditions`.
+#[derive(serde::Deserialize)]
+#[serde(untagged)]
+enum Written {
+    Now { conditions: Begun },
+    Before(Begun),
+}
+
+/// What settings begin with, of any kind and version.
+pub fn begun_in(text: &str) -> Option<Begun> {
+    match serde_yaml::from_str(text).ok()? {
+        Written::Now { conditions } => Some(conditions),
+        Written::Before(begun) => Some(begun),
+    }
 }
 
 /// A directory that is gone on with.
@@ -247,14 +265,9 @@ fn copied(directory: &Path, space: &str, digest: &str) -> Copied {
 
 /// A remark on the copy of its space in a directory, if it was edited or is gone.
 pub fn remark_on_copy(directory: &Path) -> Option<String> {
-    #[derive(serde::Deserialize)]
-    struct Begun {
-        space: String,
-        space_digest: String,
-    }
     let kind = what_was_begun(directory).filter(|kind| kind.keeps_space)?;
     let text = load::read(&kind.settings(directory)).ok()?;
-    let Begun { space, space_digest } = serde_yaml::from_str(&text).ok()?;
+    let Begun { space, space_digest, .. } = begun_in(&text)?;
     let copy = directory.join(pack::SPACE);
     let copy = copy.shown();
     match copied(directory, &space, &space_digest) {
@@ -309,8 +322,8 @@ pub fn settings_of<C: Campaign>(directory: &Path) -> Result<(C, String), Failure
     let (what, path) = (C::KIND.what, C::KIND.settings(directory));
     let text = load::text(&path)?;
     // Settings of another version may have other fields: this comes first.
-    let begun: Begun = load::parsed(&path, &text)?;
-    if (begun.engine.as_str(), begun.avastra.as_str()) != (ENGINE, VERSION) {
+    let begun = begun_in(&text);
+    if let Some(begun) = begun.filter(|begun| (&*begun.engine, &*begun.avastra) != (ENGINE, VERSION)) {
         return Err(Failure::usage(format!(
             "the {what} in `{}` was begun by avastra {} in world `{}`, this is avastra {VERSION} in `{ENGINE}`: begin a new one",
             directory.shown(),
@@ -603,9 +616,7 @@ pub struct Player<'a> {
     pub command: &'a str,
     pub table: &'a ActionTable,
     pub agent: &'a str,
-    /// Rules switched off, and those switched on.
-    pub without: &'a [String],
-    pub with: &'a [String],
+    pub conditions: &'a Conditions,
 }
 
 impl Player<'_> {
@@ -632,7 +643,7 @@ impl Player<'_> {
     ) -> Result<String, Failure> {
         let (folder, name) = (path.parent().unwrap_or(Path::new(".")), path.file_stem().unwrap_or_default());
         let space_path = load::relative(folder, &self.table.space().path)?;
-        let Player { command, agent, without, with, .. } = *self;
+        let Player { command, agent, conditions: Conditions { without, with, .. }, .. } = *self;
         let (name, space_path) = (&*name.to_string_lossy(), space_path.as_str());
         let source = emit::Provenance { command, name, space_path, episode, agent, without, with };
         Ok(print(&emitted(&source)))

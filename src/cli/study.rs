@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use std::time::Instant;
 
 use avastra_base::outside::Shown;
-use avastra_campaign::run::{DatabaseError, Numbered, RunError, TrafficRecord};
+use avastra_campaign::run::{Conditions, DatabaseError, Numbered, RunError, TrafficRecord};
 use avastra_campaign::study::{
     CellRecord, Event, FailedCell, Job, Spent, Study, StudyDatabase, StudyError, StudyFile, StudyResults,
     StudySettings, play_jobs,
@@ -43,7 +43,7 @@ impl Campaign for StudySettings {
     type Database = StudyDatabase;
 
     fn outside(&mut self) -> Outside<'_> {
-        let StudySettings { space, space_digest, external, .. } = self;
+        let Conditions { space, space_digest, external, .. } = &mut self.conditions;
         Outside { space, space_digest, external, policy: None }
     }
 }
@@ -105,7 +105,7 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
             let held = run_directory::create_empty(out)?;
             shard::keep(&held.path, shard)?;
             let settings = study.settings().clone();
-            let attached = settings.external.clone();
+            let attached = settings.conditions.external.clone();
             let directory = Directory::begin(held, settings, &study.table().space().path, attached)?;
             ((study, directory), reused)
         }
@@ -142,7 +142,7 @@ fn play_all(
     let todo: Vec<Job> = left.iter().map(|&job| all[job].clone()).collect();
 
     // Each job has a process, or a connection, of its own: these are only to see that they can be had.
-    let external = study.settings().external.as_ref().filter(|_| !todo.is_empty());
+    let external = study.settings().conditions.external.as_ref().filter(|_| !todo.is_empty());
     directory.refuse_to_play(external.is_none_or(|attached| !attached.is_recorded))?;
     let probe = external.map(|attached| Program::new(attached.settings.clone()));
     let jobs = jobs(asked_jobs, probe.as_ref())?;
@@ -337,7 +337,7 @@ fn heading(study: &Study) -> String {
         study.table().space().path.shown(),
         labels.join(", "),
         study.ads_name(),
-        settings.roads.join(", "),
+        settings.conditions.roads.join(", "),
         plural(settings.evaluation.episodes as usize, "episode"),
         plural(settings.evaluation.seeds as usize, "seed"),
         settings.first_seed

@@ -9,7 +9,7 @@ use avastra_campaign::emit;
 use avastra_campaign::episode::{Breach, Script};
 use avastra_campaign::oracle;
 use avastra_campaign::oracle::MIXED;
-use avastra_campaign::run::{Database, EpisodeSummary, RunSettings, Shard, Stage, TrafficRecord, Units};
+use avastra_campaign::run::{Conditions, Database, EpisodeSummary, Shard, Stage, TrafficRecord, Units};
 use avastra_campaign::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
 use avastra_drivers::external::Attached;
 use avastra_lang::model::policy::{PolicyClaims, PolicyOrigin};
@@ -54,7 +54,7 @@ impl Campaign for TrainSettings {
     type Database = Database;
 
     fn outside(&mut self) -> Outside<'_> {
-        let TrainSettings { space, space_digest, external, .. } = self;
+        let Conditions { space, space_digest, external, .. } = &mut self.conditions;
         Outside { space, space_digest, external, policy: None }
     }
 }
@@ -93,7 +93,7 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, Direc
     let space = table.space();
     let UnderTest { ads, profile, external } = load::named(&arguments.under_test.ads)?;
     let traffic = arguments.traffic.as_deref().map(load::traffic).transpose()?;
-    let conditions = RunSettings {
+    let conditions = Conditions {
         roads: roads_or_all(&arguments.road, space),
         ads,
         // Without a file nothing is recorded.
@@ -102,9 +102,15 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, Direc
         traffic: traffic.as_ref().and_then(TrafficRecord::new),
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
-        ..RunSettings::new(space, &arguments.agent, arguments.episodes, arguments.seed)
+        ..Conditions::of(space)
     };
-    let settings = TrainSettings::new(conditions, hyperparameters);
+    let settings = TrainSettings {
+        conditions,
+        agent: arguments.agent.clone(),
+        episodes: arguments.episodes,
+        seed: arguments.seed,
+        hyperparameters,
+    };
     let mut training = Training::new(table, settings)?;
     let (out, space) = (arguments.out.as_deref(), &training.table().space().path);
     let (held, copy) = run_directory::create(out, Shard::WHOLE, space, arguments.self_contained)?;
@@ -160,8 +166,8 @@ fn keep(
     stop: &AtomicBool,
 ) -> Result<(), Failure> {
     let settings = training.settings();
-    let TrainSettings { agent, without, with, .. } = settings;
-    let player = Player { command: "train", table: training.table(), agent, without, with };
+    let TrainSettings { agent, conditions, .. } = settings;
+    let player = Player { command: "train", table: training.table(), agent, conditions };
     directory.write_failure(&player, (&trained.log, &trained.summary))?;
     let is_first = |breach: &Breach| {
         let name = &training.table().space().requirements[breach.requirement].name;
@@ -288,8 +294,8 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
 /// database. A training finds the same failure over and over, so not all are played again, but one after the other until one
 /// recurs: only a failure of which all were tried may be called one that does not.
 fn find_recurrence(output: &Output, training: &Training, directory: &mut Directory) -> Result<(), Failure> {
-    let TrainSettings { agent, without, with, .. } = training.settings();
-    let player = Player { command: "train", table: training.table(), agent, without, with };
+    let TrainSettings { agent, conditions, .. } = training.settings();
+    let player = Player { command: "train", table: training.table(), agent, conditions };
     let _working = Working::new(output, "playing what it found again");
     // What is written anew meanwhile is done, and not looked at again.
     let written = directory.read(Units::scenarios)?;
@@ -331,7 +337,7 @@ fn search_text(directory: &Path, critical: &[PathBuf]) -> String {
 
 /// Episodes of an evaluation, on all roads together.
 fn played(settings: &TrainSettings, evaluation: &Evaluation) -> usize {
-    evaluation.episodes as usize * settings.roads.len()
+    evaluation.episodes as usize * settings.conditions.roads.len()
 }
 
 /// Episodes of an evaluation that ended because the driving system failed.
@@ -342,14 +348,14 @@ fn failed(evaluation: &Evaluation) -> usize {
 /// The policy to be written, with the rules distilled from it and the claims of both.
 fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Policy {
     let settings = training.settings();
-    let name = match settings.roads.as_slice() {
+    let name = match settings.conditions.roads.as_slice() {
         [road] => format!("{road}_{}_{}", settings.agent, settings.seed),
         _ => format!("{}_{}", settings.agent, settings.seed),
     };
     let network = acting.network();
     let attached = training.arena().attached();
     let attached = attached.as_ref();
-    let profile = settings.profile.as_ref();
+    let profile = settings.conditions.profile.as_ref();
     let (line, digest) = profile.map(|profile| (profile.settings.to_line(), profile.digest.clone())).unzip();
     let policy = Policy {
         name,
@@ -358,15 +364,15 @@ fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Pol
             agent: settings.agent.clone(),
             seed: settings.seed,
             episodes: u64::from(settings.episodes),
-            roads: settings.roads.clone(),
-            ads: settings.ads.clone(),
+            roads: settings.conditions.roads.clone(),
+            ads: settings.conditions.ads.clone(),
             profile: line.filter(|line| !line.is_empty()).or_else(|| attached.map(Attached::to_line)),
             profile_digest: digest.or_else(|| attached.map(Attached::digest)),
-            traffic: settings.traffic.as_ref().map(TrafficRecord::in_words),
-            engine: settings.engine.clone(),
-            avastra: settings.avastra.clone(),
-            with: settings.with.clone(),
-            without: settings.without.clone(),
+            traffic: settings.conditions.traffic.as_ref().map(TrafficRecord::in_words),
+            engine: settings.conditions.engine.clone(),
+            avastra: settings.conditions.avastra.clone(),
+            with: settings.conditions.with.clone(),
+            without: settings.conditions.without.clone(),
         },
         layers: network.shape().layers.clone(),
         dueling: network.shape().dueling,
@@ -408,7 +414,7 @@ fn headline(settings: &TrainSettings, evaluation: &Evaluation) -> String {
         settings.agent,
         settings.hyperparameters.preset(),
         plural(settings.episodes as usize, "episode"),
-        settings.roads.join(", "),
+        settings.conditions.roads.join(", "),
         plural(evaluation.counted as usize, "counted collision"),
         plural(played(settings, evaluation), "episode"),
     )
@@ -427,9 +433,9 @@ fn heading(training: &Training, directory: &Path) -> String {
         settings.agent,
         settings.hyperparameters.preset(),
         training.arena().ads_name(),
-        profile_text(settings.profile.as_ref()),
+        profile_text(settings.conditions.profile.as_ref()),
         plural(settings.episodes as usize, "episode"),
-        settings.roads.join(", "),
+        settings.conditions.roads.join(", "),
         settings.seed,
         directory.shown()
     )

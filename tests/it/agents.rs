@@ -4,7 +4,7 @@
 use std::sync::atomic::AtomicBool;
 
 use avastra::agent::{Entry, Kind, Settings};
-use avastra::run::{EpisodeSummary, Run, RunSettings};
+use avastra::run::{Conditions, EpisodeSummary, Run, RunSettings};
 use avastra::train::{TrainSettings, TrainedEpisode, Training};
 use avastra::{agent, run};
 
@@ -14,7 +14,8 @@ use crate::world::{assert_replays, run};
 fn run_of(entry: &Entry, seed: u64) -> Run {
     let usual = run(2, seed, &[]);
     let roads = vec!["corner".to_owned()];
-    let settings = RunSettings { agent: entry.name.to_owned(), roads, ..usual.settings().clone() };
+    let conditions = Conditions { roads, ..usual.settings().conditions.clone() };
+    let settings = RunSettings { agent: entry.name.to_owned(), conditions, ..usual.settings().clone() };
     Run::new(usual.table().clone(), settings).expect("it can act at once")
 }
 
@@ -27,11 +28,14 @@ fn training(entry: &Entry, checkpoint: Option<(usize, &[u8])>) -> Option<Trainin
     };
     let usual = run(1, 1, &[]);
     let hyperparameters = Settings::from_yaml(entry, None, text)?.expect("the settings are sound");
-    let conditions = RunSettings {
-        roads: vec!["corner".to_owned(), "residential".to_owned()],
-        ..RunSettings::new(usual.space(), entry.name, 24, 3)
+    let roads = vec!["corner".to_owned(), "residential".to_owned()];
+    let settings = TrainSettings {
+        conditions: Conditions { roads, ..Conditions::of(usual.space()) },
+        agent: entry.name.to_owned(),
+        episodes: 24,
+        seed: 3,
+        hyperparameters,
     };
-    let settings = TrainSettings::new(conditions, hyperparameters);
     let table = usual.table().clone();
     let training = match checkpoint {
         None => Training::new(table, settings),

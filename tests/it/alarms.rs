@@ -2,7 +2,7 @@
 
 use avastra::action::ActionTable;
 use avastra::ads::Reason;
-use avastra::run::{Run, RunSettings};
+use avastra::run::{Conditions, Run, RunSettings};
 
 use crate::world::space;
 
@@ -13,7 +13,8 @@ const AMBIENT: u32 = 8;
 #[test]
 fn ordinary_traffic_needs_no_emergency_braking() {
     let space = space("avastra45.ava");
-    let settings = RunSettings { ambient: AMBIENT, ..RunSettings::new(&space, "none", EPISODES, 7) };
+    let conditions = Conditions { ambient: AMBIENT, ..Conditions::of(&space) };
+    let settings = RunSettings::new(conditions, "none", EPISODES, 7);
     let run = Run::new(ActionTable::new(space), settings).expect("the settings name what exists");
     let (mut alarms, mut way_m) = (0, 0.0);
     for number in 0..run.episodes() {

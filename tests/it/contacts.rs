@@ -9,10 +9,10 @@ use avastra::ads::{Ads, ModularConfig};
 use avastra::geometry::{OrientedBox, Pose, Sweep, Vec2, first_contact};
 use avastra::rng;
 use avastra::rng::{Rng, Stream};
-use avastra::run::{Profile, Run, RunSettings};
+use avastra::run::{Profile, Run};
 use avastra::sim::{Contact, DT_S, Obstacle, World};
 
-use crate::world::run;
+use crate::world::{run, under};
 
 const CASES: u64 = 10_000;
 /// Length of a case, ticks.
@@ -343,8 +343,7 @@ fn blind() -> Run {
     let mut config = ModularConfig::default();
     config.perception.range_factor = 0.1;
     config.perception.blind_to_pedestrians = true;
-    let settings = RunSettings { profile: Some(Profile::new(&config)), ..usual.settings().clone() };
-    Run::new(usual.table().clone(), settings).expect("only the settings of the driving system are others")
+    under(&usual, |conditions| conditions.profile = Some(Profile::new(&config)))
 }
 
 #[test]

@@ -144,7 +144,7 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
     for (from, to, what) in [
         ("episodes: 3", "episodes: 4", "`episodes` was 3"),
         ("seed: 1", "seed: 2", "`seed` was 1"),
-        ("ambient: 0", "ambient: 5", "`ambient` was 0"),
+        ("ambient: 0", "ambient: 5", "`conditions.ambient` was 0"),
     ] {
         edit(&settings, from, to);
         fails(&["run", "--resume", &out], what);

@@ -5,11 +5,11 @@ use std::sync::atomic::AtomicBool;
 
 use avastra::episode::{EpisodeLog, Outcome, Script};
 use avastra::oracle::Replays;
-use avastra::run::{EpisodeSummary, Run, RunSettings, play};
+use avastra::run::{EpisodeSummary, Run, play};
 use avastra::{emit, oracle};
 
 use crate::cases::expect_snapshot;
-use crate::world::{assert_replays, loaded, run, run_of, run_with_flicker, space_at};
+use crate::world::{assert_replays, loaded, run, run_of, run_with_flicker, space_at, under};
 
 const EPISODES: u32 = 12;
 
@@ -24,8 +24,7 @@ fn every_log_replays_to_the_bit() {
 #[test]
 fn ambient_traffic_replays_to_the_bit() {
     let quiet = run(4, 7, &[]);
-    let settings = RunSettings { ambient: 6, ..quiet.settings().clone() };
-    let busy = Run::new(quiet.table().clone(), settings).expect("the settings name what exists");
+    let busy = under(&quiet, |conditions| conditions.ambient = 6);
     for number in 0..busy.episodes() {
         let log = busy.episode(number);
         assert_eq!(log.start.ambient, 6);

@@ -7,11 +7,11 @@ use avastra::episode::EpisodeLog;
 use avastra::model::Space;
 use avastra::oracle;
 use avastra::oracle::{Diagnosis, Fate, Found, Verdict};
-use avastra::run::{Profile, Run, RunSettings};
+use avastra::run::{Profile, Run};
 
 use crate::cases::root;
 use crate::profiles::profile;
-use crate::world::{read, run_of};
+use crate::world::{read, run_of, under};
 
 /// Episodes on each road.
 const EPISODES: u32 = 50;
@@ -75,8 +75,7 @@ fn the_module_at_fault_is_named() {
         let module = module_of(name);
         let usual = run_of(made(space), EPISODES, seed, &[]);
         let planted = decoys.with_module_of(module, &fault(name));
-        let settings = RunSettings { profile: Some(Profile::new(&planted)), ..usual.settings().clone() };
-        let run = Run::new(usual.table().clone(), settings).expect("the settings name what exists");
+        let run = under(&usual, |conditions| conditions.profile = Some(Profile::new(&planted)));
         let crashes = (begin..run.episodes()).filter_map(|number| crash(&run, number, module));
         let mut named = crashes.take(CRASHES).map(|(number, log, index)| {
             let found = oracle::diagnose(
@@ -105,8 +104,7 @@ fn what_is_as_in_the_baseline_is_not_blamed() {
     let planted = degraded.with_module_of(Module::Perception, &fault("perception_flicker"));
     let default = ModularConfig::default();
     let usual = run_of(made(SHIPPED), EPISODES, 3, &[]);
-    let settings = RunSettings { profile: Some(Profile::new(&planted)), ..usual.settings().clone() };
-    let run = Run::new(usual.table().clone(), settings).expect("the settings name what exists");
+    let run = under(&usual, |conditions| conditions.profile = Some(Profile::new(&planted)));
     let mut diagnosed = 0;
     for number in 0..run.episodes() {
         let (summary, log) = run.judged(number);

@@ -6,7 +6,7 @@ use avastra::action::ActionTable;
 use avastra::ads;
 use avastra::episode::{End, StepLog};
 use avastra::road::{LaneIndex, Precedence, RoadMap, Route};
-use avastra::run::{Run, RunSettings};
+use avastra::run::{Conditions, Run, RunSettings};
 use avastra::sim::{Scene, SensedObject, Start, World};
 
 use crate::cases::{expect_snapshot, root};
@@ -163,7 +163,8 @@ fn where_a_street_ends_there_is_no_way_on() {
 fn a_wait_at_a_red_light_is_no_stall() {
     // Two steps without progress would end these episodes, unless they are a wait for a light.
     let space = space_at(&path("red_light.ava"));
-    let settings = RunSettings { ads: "idm".to_owned(), ..RunSettings::new(&space, "none", 12, 1) };
+    let conditions = Conditions { ads: "idm".to_owned(), ..Conditions::of(&space) };
+    let settings = RunSettings::new(conditions, "none", 12, 1);
     let run = Run::new(ActionTable::new(space), settings).expect("the settings are sound");
     let mut waits = 0;
     for number in 0..run.episodes() {
@@ -181,7 +182,8 @@ fn an_episode_that_no_goal_ends_ends_where_the_map_does() {
     let space = space_at(&path("no_goal.ava"));
     let way_m = space.roads[0].route.path.length_m();
     for entry in ["modular", "frenet", "reactive", "idm", "cc"] {
-        let settings = RunSettings { ads: entry.to_owned(), ..RunSettings::new(&space, "none", 1, 1) };
+        let conditions = Conditions { ads: entry.to_owned(), ..Conditions::of(&space) };
+        let settings = RunSettings::new(conditions, "none", 1, 1);
         let run = Run::new(ActionTable::new(space.clone()), settings).expect("the settings are sound");
         let log = run.episode(0);
         assert_eq!(log.end, End::LeftMap, "{entry}");

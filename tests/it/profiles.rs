@@ -38,7 +38,7 @@ fn shipped_profiles_are_accepted_and_recorded() {
         assert_eq!(status, 0, "{stderr}");
         let text = std::fs::read_to_string(directory.join("run.yaml")).expect("it was written");
         let settings: RunSettings = serde_yaml::from_str(&text).expect("it reads back");
-        let recorded = settings.profile.expect("modular has settings");
+        let recorded = settings.conditions.profile.expect("modular has settings");
         assert_eq!((recorded.settings, recorded.digest), (profile(&file), profile(&file).digest()));
     }
     assert_eq!(profile("scenarios/ads/default.yaml"), ModularConfig::default());

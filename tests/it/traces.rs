@@ -3,10 +3,8 @@
 //! `tests/interop/builds.sh` runs this in the debug and in the release profile. After a change of the
 //! engine: `INSTA_UPDATE=always cargo test --test it traces`, and raise `sim::ENGINE`.
 
-use avastra::run::{Run, RunSettings};
-
 use crate::cases::expect_snapshot;
-use crate::world::run;
+use crate::world::{run, under};
 
 #[test]
 fn ten_episodes_are_the_same_everywhere() {
@@ -14,8 +12,7 @@ fn ten_episodes_are_the_same_everywhere() {
     for seed in 1..=5 {
         for ads in ["modular", "idm"] {
             let usual = run(1, seed, &[]);
-            let settings = RunSettings { ads: ads.to_owned(), ..usual.settings().clone() };
-            let run = Run::new(usual.table().clone(), settings).expect("only the driving system is another");
+            let run = under(&usual, |conditions| conditions.ads = ads.to_owned());
             // With one episode a road, the number of an episode is that of its road.
             let log = run.episode(seed as usize % run.episodes());
             let steps = log.steps.len();

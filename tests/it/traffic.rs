@@ -31,7 +31,7 @@ fn a_run_under_released_traffic_is_recorded_and_its_scenarios_replay() {
         run(&directory, &["--episodes", "20", "--traffic", "released", "--ads", FLICKER]);
     assert_eq!(status, 0, "{stderr}");
     let released = TrafficProfile::shipped("released").expect("it is sound");
-    let record = settings(&directory).1.traffic.expect("it is not the default");
+    let record = settings(&directory).1.conditions.traffic.expect("it is not the default");
     assert_eq!((record.settings, record.digest), (released, released.digest()));
 
     let files = entries(directory.join("critical"));
@@ -58,7 +58,7 @@ fn the_default_by_name_is_the_default() {
         assert_eq!(status, 0, "{stderr}");
     }
     assert_eq!(settings(&plain).0, settings(&named).0);
-    assert_eq!(settings(&plain).1.traffic, None);
+    assert_eq!(settings(&plain).1.conditions.traffic, None);
     assert!(!settings(&plain).0.contains("traffic: "));
 }
 

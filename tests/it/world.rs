@@ -8,7 +8,7 @@ use avastra::ads::ModularConfig;
 use avastra::check::{Loaded, ReadError};
 use avastra::episode::{EpisodeLog, Script};
 use avastra::model::{MomentFacts, Space};
-use avastra::run::{Profile, Run, RunSettings};
+use avastra::run::{Conditions, Profile, Run, RunSettings};
 
 use crate::cases::root;
 
@@ -85,8 +85,14 @@ pub fn run_with_flicker(episodes: u32, seed: u64) -> Run {
     let usual = run(episodes, seed, &[]);
     let text = std::fs::read_to_string(root().join(FLICKER)).expect("it is shipped");
     let config = ModularConfig::from_yaml(&text).expect("it is sound");
-    let settings = RunSettings { profile: Some(Profile::new(&config)), ..usual.settings().clone() };
-    Run::new(usual.table().clone(), settings).expect("only the settings of the driving system are others")
+    under(&usual, |conditions| conditions.profile = Some(Profile::new(&config)))
+}
+
+/// A run under other conditions.
+pub fn under(usual: &Run, change: impl FnOnce(&mut Conditions)) -> Run {
+    let mut settings = usual.settings().clone();
+    change(&mut settings.conditions);
+    Run::new(usual.table().clone(), settings).expect("the conditions name what exists")
 }
 
 /// A run of masked random search in any space, against the modular driving system.
@@ -96,10 +102,11 @@ pub fn run_of(space: Arc<Space>, episodes: u32, seed: u64, without: &[&str]) -> 
 
 /// A run of masked random search in any space, against any driving system.
 pub fn run_against(ads: &str, space: Arc<Space>, episodes: u32, seed: u64, without: &[&str]) -> Run {
-    let settings = RunSettings {
+    let conditions = Conditions {
         ads: ads.to_owned(),
         without: without.iter().map(|rule| (*rule).to_owned()).collect(),
-        ..RunSettings::new(&space, "random", episodes, seed)
+        ..Conditions::of(&space)
     };
+    let settings = RunSettings::new(conditions, "random", episodes, seed);
     Run::new(ActionTable::new(space), settings).expect("the settings name what exists")
 }

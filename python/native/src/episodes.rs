@@ -238,7 +238,7 @@ impl Episodes {
 
     fn __repr__(&self) -> String {
         let settings = self.run.settings();
-        let road = settings.roads.join(", ");
+        let road = settings.conditions.roads.join(", ");
         format!("<avastra.Episodes on {road} against {}>", self.run.arena().ads_name())
     }
 }

@@ -70,7 +70,7 @@ impl Comparison {
 
     /// The number in its run of the episode of a pair.
     fn episode(&self, pair: usize) -> usize {
-        let roads = self.first.settings().roads.len();
+        let roads = self.first.settings().conditions.roads.len();
         pair % roads * self.first.settings().episodes as usize + pair / roads
     }
 }

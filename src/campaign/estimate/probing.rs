@@ -61,7 +61,7 @@ pub fn pilot(estimate: &Estimate, threads: usize, stop: &AtomicBool) -> Option<P
         };
         // Numbers of parts that no estimate has.
         let number = u32::MAX - round;
-        let roads = 0..settings.run.roads.len();
+        let roads = 0..settings.run.conditions.roads.len();
         let items: Vec<(Part, u32)> = roads
             .flat_map(|road| (0..episodes).map(move |episode| (Part { road, number }, episode)))
             .collect();

@@ -104,7 +104,7 @@ pub struct Found<'a> {
 impl EstimateResults {
     /// The result over parts in any order.
     pub fn new(settings: &EstimateSettings, found: Found) -> EstimateResults {
-        let roads = &settings.run.roads;
+        let roads = &settings.run.conditions.roads;
         let of = |road: usize| -> Vec<&PartRecord> {
             let mut own: Vec<_> = found.records.iter().filter(|record| record.part.road == road).collect();
             own.sort_by_key(|record| record.part.number);

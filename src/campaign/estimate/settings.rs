@@ -198,13 +198,13 @@ impl EstimateSettings {
     /// All parts: the first of every road before the second of any, so that an unfinished estimate says something
     /// about all roads.
     pub fn all_parts(&self) -> Vec<Part> {
-        let roads = self.run.roads.len();
+        let roads = self.run.conditions.roads.len();
         (0..self.parts).flat_map(|number| (0..roads).map(move |road| Part { road, number })).collect()
     }
 
     /// The place of a part among all, which is its number in `estimate.db`.
     pub fn place(&self, part: Part) -> i64 {
-        i64::from(part.number) * self.run.roads.len() as i64 + part.road as i64
+        i64::from(part.number) * self.run.conditions.roads.len() as i64 + part.road as i64
     }
 
     /// The numbers of parts of a road after which it is looked whether to stop; all parts are the last.
@@ -266,7 +266,7 @@ impl EstimateSettings {
         if let Some(found) = self.stopping.hours.filter(|hours| !(hours.is_finite() && *hours > 0.0)) {
             return Err(EstimateError::Hours { found });
         }
-        if self.method != Method::Count && self.run.external.is_some() {
+        if self.method != Method::Count && self.run.conditions.external.is_some() {
             return Err(EstimateError::External);
         }
         if self.method != Method::Count && self.event.is_breach() {

@@ -47,7 +47,7 @@ pub use protocol::{Ending, HeatMap, ProtocolTest, Tally, heat_maps, main_maps, p
 pub use sealed::differences as settings_differences;
 pub use sealed::{DatabaseError, Layout};
 pub(crate) use sealed::{insert_row, of_columns, query_all, settings_digest};
-pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};
+pub use settings::{Conditions, EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};
 pub(crate) use settings::{agent_named, check_episodes};
 pub use settled::{Numbered, Units, WrittenScenario};
 pub use shard::{SHARDS_MAX, Shard};

@@ -74,11 +74,21 @@ impl Run {
         if settings.avoidability != AvoidabilitySettings::default() {
             return Err(RunError::Avoidability);
         }
-        let ads = under_test(&settings.ads, settings.profile.as_ref(), settings.external.as_ref())?;
+        let ads = under_test(
+            &settings.conditions.ads,
+            settings.conditions.profile.as_ref(),
+            settings.conditions.external.as_ref(),
+        )?;
         let has_modules = ads.profile().is_some();
-        let traffic = traffic_of(settings.traffic.as_ref())?;
-        let arena =
-            Arena::new(table, &settings.roads, ads, &settings.with, &settings.without)?.with_traffic(traffic);
+        let traffic = traffic_of(settings.conditions.traffic.as_ref())?;
+        let arena = Arena::new(
+            table,
+            &settings.conditions.roads,
+            ads,
+            &settings.conditions.with,
+            &settings.conditions.without,
+        )?
+        .with_traffic(traffic);
         if settings.causes && !has_modules {
             return Err(RunError::NoModules(oracle::NoModules { ads: arena.ads_name() }));
         }
@@ -183,13 +193,13 @@ impl Run {
     /// An episode of any seed on the nth of the roads.
     pub fn setup_of(&self, road: usize, seed: u64) -> episode::Setup {
         let mut setup = self.arena.setup(road, seed);
-        setup.start.ambient = self.settings.ambient;
+        setup.start.ambient = self.settings.conditions.ambient;
         setup
     }
 
     /// How many vehicles of ambient traffic are there at the beginning of an episode on each road, by its name.
     pub fn ambient_at_start(&self) -> Vec<(String, u32)> {
-        let found = (0..self.settings.roads.len()).map(|road| {
+        let found = (0..self.settings.conditions.roads.len()).map(|road| {
             let first = road * self.settings.episodes as usize;
             let seed = rng::child_seed(self.settings.seed, Stream::Episode, first as u64);
             let setup = self.setup_of(road, seed);

@@ -14,15 +14,16 @@ use crate::run::profile::{DEFAULT_ADS, Profile, TrafficRecord};
 /// Version of avastra, as settings record it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// Everything that is needed to repeat a run; written to `run.yaml`.
+/// Where episodes play, against which driving system and under which circumstances: what runs, trainings and studies have in
+/// common.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct RunSettings {
+pub struct Conditions {
     /// Version of avastra that wrote it.
     pub avastra: String,
     /// Version of the simulated world.
     pub engine: String,
-    /// Path of the space, from the run directory.
+    /// Path of the space, from the directory in which this is written.
     pub space: String,
     /// What the space meant: see `model::Meaning`.
     pub space_digest: String,
@@ -32,9 +33,46 @@ pub struct RunSettings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<Profile>,
     /// Who an external driving system said to be, and how it is reached and asked. Its working directory is one from
-    /// the run directory.
+    /// the directory in which this is written.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub external: Option<Attached>,
+    /// Vehicles of ambient traffic.
+    #[serde(default)]
+    pub ambient: u32,
+    /// How other vehicles drive, if not as in the default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traffic: Option<TrafficRecord>,
+    /// Rules switched off.
+    pub without: Vec<String>,
+    /// Optional rules switched on.
+    pub with: Vec<String>,
+}
+
+impl Conditions {
+    /// All roads of a space and the default driving system, with every option off. The caller changes what it wants otherwise.
+    pub fn of(space: &Space) -> Conditions {
+        Conditions {
+            avastra: VERSION.to_owned(),
+            engine: ENGINE.to_owned(),
+            space: space.path.to_string_lossy().into_owned(),
+            space_digest: space.meaning.seal(),
+            roads: space.roads.iter().map(|road| road.name.clone()).collect(),
+            ads: DEFAULT_ADS.to_owned(),
+            profile: None,
+            external: None,
+            ambient: 0,
+            traffic: None,
+            without: Vec::new(),
+            with: Vec::new(),
+        }
+    }
+}
+
+/// Everything that is needed to repeat a run; written to `run.yaml`.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunSettings {
+    pub conditions: Conditions,
     pub agent: String,
     /// The policy that the agent follows, from the run directory, and its digest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -45,12 +83,6 @@ pub struct RunSettings {
     #[serde(default, skip_serializing_if = "is_zero")]
     pub rows: u32,
     pub seed: u64,
-    /// Vehicles of ambient traffic.
-    #[serde(default)]
-    pub ambient: u32,
-    /// How other vehicles drive, if not as in the default.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub traffic: Option<TrafficRecord>,
     /// Whether each counted collision is diagnosed.
     #[serde(default)]
     pub causes: bool,
@@ -60,10 +92,6 @@ pub struct RunSettings {
     /// Episodes in which nothing was found that are kept as scenarios, too: collisions that do not count, then the nearest misses.
     #[serde(default)]
     pub keep: u32,
-    /// Rules switched off.
-    pub without: Vec<String>,
-    /// Optional rules switched on.
-    pub with: Vec<String>,
     /// How the avoidability of collisions is judged: in one way, of which this is the record.
     #[serde(default)]
     pub avoidability: AvoidabilitySettings,
@@ -76,34 +104,22 @@ fn is_zero(count: &u32) -> bool {
 impl RunSettings {
     /// Number of episodes on all roads together.
     pub fn all_episodes(&self) -> usize {
-        let times = if self.rows > 0 { self.rows as usize } else { self.roads.len() };
+        let times = if self.rows > 0 { self.rows as usize } else { self.conditions.roads.len() };
         times * self.episodes as usize
     }
 
-    /// A run on all roads of a space against the default driving system, with every option off. The caller
-    /// changes what it wants otherwise.
-    pub fn new(space: &Space, agent: &str, episodes: u32, seed: u64) -> RunSettings {
+    /// A run with every option off. The caller changes what it wants otherwise.
+    pub fn new(conditions: Conditions, agent: &str, episodes: u32, seed: u64) -> RunSettings {
         RunSettings {
-            avastra: VERSION.to_owned(),
-            engine: ENGINE.to_owned(),
-            space: space.path.to_string_lossy().into_owned(),
-            space_digest: space.meaning.seal(),
-            roads: space.roads.iter().map(|road| road.name.clone()).collect(),
-            ads: DEFAULT_ADS.to_owned(),
-            profile: None,
-            external: None,
+            conditions,
             agent: agent.to_owned(),
             policy: None,
             episodes,
             rows: 0,
             seed,
-            ambient: 0,
-            traffic: None,
             causes: false,
             replays: 0,
             keep: 0,
-            without: Vec::new(),
-            with: Vec::new(),
             avoidability: AvoidabilitySettings::default(),
         }
     }

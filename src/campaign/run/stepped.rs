@@ -154,7 +154,7 @@ mod tests {
 
     use super::*;
     use crate::episode::Outcome;
-    use crate::run::{Run, RunSettings};
+    use crate::run::{Conditions, Run, RunSettings};
     use avastra_lang::check::{ReadError, load};
     use avastra_world::action::ActionTable;
 
@@ -163,11 +163,9 @@ mod tests {
         let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
         let loaded = load(Path::new("../../scenarios/avastra45.ava"), &read).unwrap();
         let space = loaded.space.unwrap();
-        let settings = RunSettings {
-            roads: vec!["crossroad".to_owned()],
-            ads: ads.to_owned(),
-            ..RunSettings::new(&space, "random", 12, 5)
-        };
+        let roads = vec!["crossroad".to_owned()];
+        let conditions = Conditions { roads, ads: ads.to_owned(), ..Conditions::of(&space) };
+        let settings = RunSettings::new(conditions, "random", 12, 5);
         Arc::new(Run::new(ActionTable::new(space), settings).unwrap())
     }
 

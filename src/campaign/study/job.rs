@@ -94,7 +94,7 @@ fn play(
     }
     let mut cells = Vec::new();
     for &road in &job.roads {
-        let road = &study.settings().roads[road];
+        let road = &study.settings().conditions.roads[road];
         let mut episodes = Vec::new();
         for seed in 0..study.settings().evaluation.seeds {
             let run = study.evaluation(job, seed, road).expect("the study was checked when it was made");

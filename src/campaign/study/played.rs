@@ -13,7 +13,7 @@ use avastra_lang::model::digest;
 use avastra_search::agent::by_name;
 
 /// Raised whenever a field changes its meaning or goes away.
-const SCHEMA: u32 = 1;
+const SCHEMA: u32 = 2;
 
 /// A study as it was played.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,7 +89,7 @@ impl Played {
             cells.iter().map(|cell| MeasuredCell::new(cell, &settings.evaluation)).collect();
         cells.sort_by_key(|cell| {
             let agent = settings.agents.iter().position(|agent| agent.label == cell.agent);
-            (agent, settings.roads.iter().position(|road| *road == cell.road), cell.number)
+            (agent, settings.conditions.roads.iter().position(|road| *road == cell.road), cell.number)
         });
         Played { commit, settings, cells }
     }
@@ -158,7 +158,7 @@ impl Played {
             cells.filter_map(|cell| cell.value(measure)).sum()
         };
         // A training that goes round several roads stands in the cell of each.
-        let first = self.settings.roads.first();
+        let first = self.settings.conditions.roads.first();
         let goes_round = |label: &str| {
             let agent = self.settings.agents.iter().find(|agent| agent.label == label);
             agent.and_then(|agent| agent.training.as_ref()).is_some_and(|plan| !plan.roads.is_empty())
@@ -190,13 +190,14 @@ impl Played {
             found.push(format!("without {}", missing.join(", ")));
         }
         let roads: Vec<&str> = wanted
+            .conditions
             .roads
             .iter()
-            .filter(|road| self.settings.roads.contains(road))
+            .filter(|road| self.settings.conditions.roads.contains(road))
             .map(String::as_str)
             .collect();
-        if roads.len() < wanted.roads.len() {
-            found.push(format!("on {} of {} roads", roads.len(), wanted.roads.len()));
+        if roads.len() < wanted.conditions.roads.len() {
+            found.push(format!("on {} of {} roads", roads.len(), wanted.conditions.roads.len()));
         }
         // What agents have in common is said once.
         let mut alike: BTreeMap<String, Vec<&str>> = BTreeMap::new();
@@ -236,13 +237,27 @@ impl Played {
                 found.push(what.to_owned());
             }
         };
-        differs(own.engine != wanted.engine, &format!("the world is `{}` by now", wanted.engine));
-        differs(own.space_digest != wanted.space_digest, "the space means something else by now");
+        differs(
+            own.conditions.engine != wanted.conditions.engine,
+            &format!("the world is `{}` by now", wanted.conditions.engine),
+        );
+        differs(
+            own.conditions.space_digest != wanted.conditions.space_digest,
+            "the space means something else by now",
+        );
         let ads = |settings: &StudySettings| {
-            (settings.ads.clone(), settings.profile.clone(), settings.external.as_ref().map(|one| one.name()))
+            (
+                settings.conditions.ads.clone(),
+                settings.conditions.profile.clone(),
+                settings.conditions.external.as_ref().map(|one| one.name()),
+            )
         };
         differs(ads(own) != ads(wanted), "played against another driving system or profile");
-        differs((own.ambient, &own.traffic) != (wanted.ambient, &wanted.traffic), "played in other traffic");
+        differs(
+            (own.conditions.ambient, &own.conditions.traffic)
+                != (wanted.conditions.ambient, &wanted.conditions.traffic),
+            "played in other traffic",
+        );
         differs(own.first_seed != wanted.first_seed, "played from another first seed");
         differs(own.avoidability != wanted.avoidability, "verdicts have other settings by now");
         let (mine, theirs) = (&own.evaluation, &wanted.evaluation);

@@ -1,6 +1,6 @@
 //! A study that is ready to play: its jobs, their seeds, and the training and evaluations of each.
 
-use crate::run::{Run, RunError, RunSettings};
+use crate::run::{Conditions, Run, RunError, RunSettings};
 use crate::train::{TrainSettings, Training, with_period};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
@@ -32,13 +32,13 @@ impl Study {
                 study.training(job).map_err(refuse)?;
             }
             for &road in &job.roads {
-                let run = study.evaluation(job, 0, &study.settings.roads[road]).map_err(refuse)?;
+                let run = study.evaluation(job, 0, &study.settings.conditions.roads[road]).map_err(refuse)?;
                 attached = run.arena().attached();
             }
         }
         // The jobs, and a later `--resume`, must meet the same driving system. One that was not started has no identity to add.
-        if study.settings.external.as_ref().is_none_or(|external| !external.is_recorded) {
-            study.settings.external = attached;
+        if study.settings.conditions.external.as_ref().is_none_or(|external| !external.is_recorded) {
+            study.settings.conditions.external = attached;
         }
         Ok(study)
     }
@@ -53,7 +53,11 @@ impl Study {
 
     /// The driving system under test: its name here, or what an external one calls itself.
     pub fn ads_name(&self) -> String {
-        self.settings.external.as_ref().map_or_else(|| self.settings.ads.clone(), Attached::name)
+        self.settings
+            .conditions
+            .external
+            .as_ref()
+            .map_or_else(|| self.settings.conditions.ads.clone(), Attached::name)
     }
 
     pub(super) fn agent(&self, job: &Job) -> &AgentSettings {
@@ -77,12 +81,16 @@ impl Study {
         let agent = self.agent(job);
         let plan = agent.training.as_ref().expect("only agents that learn are trained");
         let roads = match plan.roads.as_slice() {
-            [] => job.roads.iter().map(|&road| self.settings.roads[road].clone()).collect(),
+            [] => job.roads.iter().map(|&road| self.settings.conditions.roads[road].clone()).collect(),
             named => named.to_vec(),
         };
-        let episodes = (plan.episodes, self.training_seed(job.number));
-        let settings =
-            TrainSettings::new(self.conditions(agent, roads, episodes), plan.hyperparameters.clone());
+        let settings = TrainSettings {
+            conditions: self.conditions(agent, roads),
+            agent: agent.name.clone(),
+            episodes: plan.episodes,
+            seed: self.training_seed(job.number),
+            hyperparameters: plan.hyperparameters.clone(),
+        };
         Training::new(self.table.clone(), settings)
     }
 
@@ -90,33 +98,27 @@ impl Study {
     /// plays the trained agent (see [`Run::judged_by`]).
     pub(super) fn evaluation(&self, job: &Job, seed: u32, road: &str) -> Result<Run, RunError> {
         let agent = self.agent(job);
-        let episodes = (self.settings.evaluation.episodes, self.evaluation_seed(job.number, seed));
-        let settings = self.conditions(agent, vec![road.to_owned()], episodes);
+        let conditions = self.conditions(agent, vec![road.to_owned()]);
+        let (episodes, seed) = (self.settings.evaluation.episodes, self.evaluation_seed(job.number, seed));
+        let settings = RunSettings {
+            causes: self.settings.causes,
+            avoidability: self.settings.avoidability.clone(),
+            ..RunSettings::new(conditions, &agent.name, episodes, seed)
+        };
         let Some(plan) = &agent.training else { return Run::new(self.table.clone(), settings) };
         let table = with_period(self.table.clone(), plan.hyperparameters.observation_period_s());
         Run::new(table, RunSettings { agent: "none".to_owned(), ..settings })
     }
 
-    /// What an agent's trainings and evaluations have in common.
-    fn conditions(
-        &self,
-        agent: &AgentSettings,
-        roads: Vec<String>,
-        (episodes, seed): (u32, u64),
-    ) -> RunSettings {
-        let study = &self.settings;
-        RunSettings {
+    /// The conditions under which an agent trains or is judged on some roads.
+    fn conditions(&self, agent: &AgentSettings, roads: Vec<String>) -> Conditions {
+        let study = &self.settings.conditions;
+        Conditions {
             roads,
-            ads: study.ads.clone(),
             profile: agent.profile.as_ref().or(study.profile.as_ref()).cloned(),
-            external: study.external.clone(),
-            ambient: study.ambient,
-            traffic: study.traffic.clone(),
-            causes: study.causes,
             without: agent.without.clone(),
             with: agent.with.clone(),
-            avoidability: study.avoidability.clone(),
-            ..RunSettings::new(self.table.space(), &agent.name, episodes, seed)
+            ..study.clone()
         }
     }
 }

@@ -155,7 +155,9 @@ impl StudyResults {
         let measured: Vec<MeasuredCell> =
             cells.iter().map(|cell| MeasuredCell::new(cell, &settings.evaluation)).collect();
         let mut cells: Vec<&CellRecord> = cells.iter().collect();
-        cells.sort_by_key(|cell| (settings.roads.iter().position(|road| *road == cell.road), cell.number));
+        cells.sort_by_key(|cell| {
+            (settings.conditions.roads.iter().position(|road| *road == cell.road), cell.number)
+        });
         let roads = measured_roads(settings, &measured).into_iter().map(|measured| {
             let agents = measured.agents.into_iter().map(|agent| {
                 let own = cells.iter().filter(|cell| cell.agent == agent.agent && cell.road == measured.road);
@@ -178,7 +180,7 @@ impl StudyResults {
             quick: settings.quick,
             evaluation: settings.evaluation.clone(),
             cells: cells.len(),
-            cells_wanted: repeats * settings.roads.len(),
+            cells_wanted: repeats * settings.conditions.roads.len(),
             together: together.collect(),
             roads: roads.collect(),
         }
@@ -207,7 +209,7 @@ pub struct MeasuredAgent {
 /// The statistics of a study, from the measures of its cells in any order.
 pub fn measured_roads(settings: &StudySettings, cells: &[MeasuredCell]) -> Vec<MeasuredRoad> {
     let mut roads: Vec<MeasuredRoad> = Vec::new();
-    for road in &settings.roads {
+    for road in &settings.conditions.roads {
         let of = |agent: &str| {
             let own = cells.iter().filter(|cell| cell.agent == agent && cell.road == *road);
             let mut own: Vec<&MeasuredCell> = own.collect();

@@ -1,6 +1,7 @@
 //! Cells that another study has played already. A cell depends on its agent's settings, its road, its number and what
 //! all agents of a study share. It does not depend on the agent's label or on the other agents of the study.
 
+use crate::run::Conditions;
 use crate::study::job::Job;
 use crate::study::record::CellRecord;
 use crate::study::settings::{AgentSettings, StudySettings};
@@ -25,7 +26,7 @@ impl StudySettings {
                 other.agents.iter().filter(|one| self.is_same(agent, other, one)).collect();
             let on_road = |&road: &usize| {
                 let is_it = |cell: &&CellRecord| {
-                    cell.road == self.roads[road]
+                    cell.road == self.conditions.roads[road]
                         && cell.number == job.number
                         && same.iter().any(|one| one.label == cell.agent)
                 };
@@ -41,6 +42,18 @@ impl StudySettings {
     /// The settings of all agents in which two studies differ.
     fn plays_otherwise(&self, other: &StudySettings) -> Vec<&'static str> {
         let StudySettings {
+            conditions,
+            first_seed,
+            evaluation,
+            causes,
+            avoidability,
+            // What an agent meets is compared with the agent; the rest is no part of a cell.
+            question: _,
+            quick: _,
+            agents: _,
+            baselines: _,
+        } = self;
+        let Conditions {
             avastra,
             engine,
             space_digest,
@@ -48,27 +61,21 @@ impl StudySettings {
             external,
             ambient,
             traffic,
-            first_seed,
-            evaluation,
-            causes,
-            avoidability,
-            // What an agent meets is compared with the agent; the rest is no part of a cell.
-            profile: _,
-            question: _,
             space: _,
             roads: _,
-            quick: _,
-            agents: _,
-            baselines: _,
-        } = self;
+            profile: _,
+            without: _,
+            with: _,
+        } = conditions;
+        let theirs = &other.conditions;
         let same = [
-            ("avastra", *avastra == other.avastra),
-            ("engine", *engine == other.engine),
-            ("space", *space_digest == other.space_digest),
+            ("avastra", *avastra == theirs.avastra),
+            ("engine", *engine == theirs.engine),
+            ("space", *space_digest == theirs.space_digest),
             // A program that is attached need not do the same twice.
-            ("ads", *ads == other.ads && external.is_none() && other.external.is_none()),
-            ("ambient", *ambient == other.ambient),
-            ("traffic", *traffic == other.traffic),
+            ("ads", *ads == theirs.ads && external.is_none() && theirs.external.is_none()),
+            ("ambient", *ambient == theirs.ambient),
+            ("traffic", *traffic == theirs.traffic),
             ("first_seed", *first_seed == other.first_seed),
             ("evaluation", *evaluation == other.evaluation),
             ("causes", *causes == other.causes),
@@ -82,7 +89,8 @@ impl StudySettings {
         let AgentSettings { name, training, profile, without, with, label: _, repeats: _ } = agent;
         *name == one.name
             && *training == one.training
-            && profile.as_ref().or(self.profile.as_ref()) == one.profile.as_ref().or(other.profile.as_ref())
+            && profile.as_ref().or(self.conditions.profile.as_ref())
+                == one.profile.as_ref().or(other.conditions.profile.as_ref())
             && *without == one.without
             && *with == one.with
     }

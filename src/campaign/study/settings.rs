@@ -4,13 +4,12 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use crate::oracle::AvoidabilitySettings;
-use crate::run::{EPISODES_MAX, Profile, RunError, TrafficRecord, VERSION, agent_named};
+use crate::run::{Conditions, EPISODES_MAX, Profile, RunError, TrafficRecord, agent_named};
 use avastra_drivers::external::{Attached, ExternalSettings};
 use avastra_drivers::{EXTERNAL, ModularConfig};
 use avastra_lang::syntax::listed;
 use avastra_search::agent::{Kind, Settings};
 use avastra_world::action::ActionTable;
-use avastra_world::sim::ENGINE;
 
 use crate::study::file::{AgentFile, EvaluationPlan, PublishedTable, StudyFile};
 use crate::study::job::Job;
@@ -20,28 +19,10 @@ use crate::study::measures::MEASURES;
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StudySettings {
-    /// Version of avastra that wrote it.
-    pub avastra: String,
-    /// Version of the simulated world.
-    pub engine: String,
+    /// Rules are switched for each agent.
+    pub conditions: Conditions,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub question: Option<String>,
-    /// Path of the space, from the study's directory.
-    pub space: String,
-    /// Digest of the space with all that it uses.
-    pub space_digest: String,
-    pub roads: Vec<String>,
-    pub ads: String,
-    /// Settings of the driving system, if it has any.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub profile: Option<Profile>,
-    /// An external driving system, as in `RunSettings`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub external: Option<Attached>,
-    pub ambient: u32,
-    /// How other vehicles drive, if not as in the default.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub traffic: Option<TrafficRecord>,
     pub first_seed: u64,
     pub evaluation: EvaluationPlan,
     pub causes: bool,
@@ -144,17 +125,16 @@ impl StudySettings {
         let published = file.published;
         let agents = file.agents.into_iter().map(|agent| agent_settings(agent, read));
         let settings = StudySettings {
-            avastra: VERSION.to_owned(),
-            engine: ENGINE.to_owned(),
+            conditions: Conditions {
+                roads,
+                ads: if external.is_some() { EXTERNAL.to_owned() } else { file.ads },
+                profile,
+                external,
+                ambient: file.ambient,
+                traffic,
+                ..Conditions::of(space)
+            },
             question: file.question,
-            space: space.path.to_string_lossy().into_owned(),
-            space_digest: space.meaning.seal(),
-            roads,
-            ads: if external.is_some() { EXTERNAL.to_owned() } else { file.ads },
-            profile,
-            external,
-            ambient: file.ambient,
-            traffic,
             first_seed: file.first_seed,
             evaluation: file.evaluation,
             causes: file.causes,
@@ -175,7 +155,7 @@ impl StudySettings {
         };
         let measures: Vec<&str> = MEASURES.iter().map(|measure| measure.name).collect();
         let labels: Vec<&str> = self.agents.iter().map(|agent| agent.label.as_str()).collect();
-        let roads: Vec<&str> = self.roads.iter().map(String::as_str).collect();
+        let roads: Vec<&str> = self.conditions.roads.iter().map(String::as_str).collect();
         among("measure", &table.measure, &measures)?;
         for (label, figures) in &table.figures {
             among("agent", label, &labels)?;
@@ -192,7 +172,7 @@ impl StudySettings {
         for number in 0..most {
             let repeated = self.agents.iter().enumerate().filter(|(_, agent)| number < agent.repeats);
             for (agent, settings) in repeated {
-                let all = (0..self.roads.len()).collect::<Vec<_>>();
+                let all = (0..self.conditions.roads.len()).collect::<Vec<_>>();
                 match &settings.training {
                     Some(training) if !training.roads.is_empty() => {
                         jobs.push(Job { agent, roads: all, number })
@@ -216,7 +196,7 @@ impl StudySettings {
     pub fn cells(&self) -> impl Iterator<Item = (&str, &str, u32)> {
         self.jobs().into_iter().flat_map(move |job| {
             let agent = self.agents[job.agent].label.as_str();
-            job.roads.into_iter().map(move |road| (agent, self.roads[road].as_str(), job.number))
+            job.roads.into_iter().map(move |road| (agent, self.conditions.roads[road].as_str(), job.number))
         })
     }
 
@@ -335,8 +315,12 @@ pub(super) fn check(settings: &StudySettings) -> Result<(), StudyError> {
     if !(1.0..=1e6).contains(&horizon_s) {
         return range("evaluation.horizon_s", horizon_s.to_string(), "from 1 to 1e6");
     }
-    if settings.ambient > avastra_lang::model::AMBIENT_MAX {
-        return range("ambient", settings.ambient.to_string(), "what `avastra run --ambient` takes");
+    if settings.conditions.ambient > avastra_lang::model::AMBIENT_MAX {
+        return range(
+            "ambient",
+            settings.conditions.ambient.to_string(),
+            "what `avastra run --ambient` takes",
+        );
     }
     if settings.agents.is_empty() {
         return Err(StudyError::NoAgent);

@@ -9,12 +9,11 @@ use ndarray::Array1;
 use crate::episode;
 use crate::episode::{Choice, End, EpisodeLog, Moment, Play, Script, Setup};
 use crate::run::{
-    Arena, EpisodeSummary, Finding, Profile, RunError, RunSettings, TrafficRecord, agent_named,
-    check_episodes, choose, legal, traffic_of, under_test,
+    Arena, Conditions, EpisodeSummary, Finding, RunError, agent_named, check_episodes, choose, legal,
+    traffic_of, under_test,
 };
 use avastra_base::rng;
 use avastra_base::rng::Stream;
-use avastra_drivers::external::Attached;
 use avastra_lang::model::Space;
 use avastra_search::agent::{Diverged, Experience, Kind, Lesson, Rows, Settings, Trainable, Trajectory};
 use avastra_search::mdp;
@@ -25,63 +24,14 @@ use avastra_world::action::ActionTable;
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainSettings {
-    /// Version of avastra that wrote it.
-    pub avastra: String,
-    /// Version of the simulated world.
-    pub engine: String,
-    /// Path of the space, from the run directory.
-    pub space: String,
-    /// Digest of the space with all that it uses.
-    pub space_digest: String,
-    /// Episodes go round them, one each.
-    pub roads: Vec<String>,
-    pub ads: String,
-    /// Settings of the driving system; without them it has its defaults.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub profile: Option<Profile>,
-    /// An external driving system, as in [`RunSettings`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub external: Option<Attached>,
+    /// Episodes go round its roads, one each.
+    pub conditions: Conditions,
     pub agent: String,
     /// Episodes on all roads together.
     pub episodes: u32,
     pub seed: u64,
-    /// Vehicles of ambient traffic.
-    #[serde(default)]
-    pub ambient: u32,
-    /// How other vehicles drive, if not as in the default.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub traffic: Option<TrafficRecord>,
-    /// Rules switched off.
-    pub without: Vec<String>,
-    /// Optional rules switched on.
-    pub with: Vec<String>,
     /// The agent's hyperparameters.
     pub hyperparameters: Settings,
-}
-
-impl TrainSettings {
-    /// A training with the agent, the episodes and the conditions of a run.
-    pub fn new(run: RunSettings, hyperparameters: Settings) -> TrainSettings {
-        TrainSettings {
-            avastra: run.avastra,
-            engine: run.engine,
-            space: run.space,
-            space_digest: run.space_digest,
-            roads: run.roads,
-            ads: run.ads,
-            profile: run.profile,
-            external: run.external,
-            agent: run.agent,
-            episodes: run.episodes,
-            seed: run.seed,
-            ambient: run.ambient,
-            traffic: run.traffic,
-            without: run.without,
-            with: run.with,
-            hyperparameters,
-        }
-    }
 }
 
 /// A training that is ready to go on.
@@ -172,7 +122,7 @@ impl Training {
         self.agent.progress(number as f64 / f64::from(self.settings.episodes));
         let exploration_epsilon = self.agent.exploration_epsilon();
         let mut setup = self.arena.setup(road, seed);
-        setup.start.ambient = self.settings.ambient;
+        setup.start.ambient = self.settings.conditions.ambient;
         setup.proc = self.settings.hyperparameters.proc();
         self.agent.begin(seed);
         let played = play(&setup, self.agent.as_mut());
@@ -295,9 +245,19 @@ fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<
     }
     let table = with_period(table, settings.hyperparameters.observation_period_s());
     let rows = Arc::new(Rows::new(&table, settings.hyperparameters.actions())?);
-    let ads = under_test(&settings.ads, settings.profile.as_ref(), settings.external.as_ref())?;
-    let arena = Arena::new(table, &settings.roads, ads, &settings.with, &settings.without)?;
-    Ok((arena.with_traffic(traffic_of(settings.traffic.as_ref())?), rows))
+    let ads = under_test(
+        &settings.conditions.ads,
+        settings.conditions.profile.as_ref(),
+        settings.conditions.external.as_ref(),
+    )?;
+    let arena = Arena::new(
+        table,
+        &settings.conditions.roads,
+        ads,
+        &settings.conditions.with,
+        &settings.conditions.without,
+    )?;
+    Ok((arena.with_traffic(traffic_of(settings.conditions.traffic.as_ref())?), rows))
 }
 
 /// The table with another observation period.

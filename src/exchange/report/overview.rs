@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use avastra_campaign::estimate::FRAME;
 use avastra_campaign::oracle::MIXED;
-use avastra_campaign::run::{Database, DatabaseError, HeatMap, Profile, RequirementCount, TrafficRecord};
+use avastra_campaign::run::{Conditions, Database, DatabaseError, HeatMap, RequirementCount, TrafficRecord};
 use avastra_drivers::external::Attached;
 use avastra_world::action::ActionTable;
 
@@ -53,11 +53,11 @@ fn requirements(database: &Database, table: Option<&ActionTable>) -> Result<Vec<
 /// What is added to recurrences where the driving system says that it is not deterministic.
 fn mixed(settings: &str) -> Option<&'static str> {
     #[derive(serde::Deserialize)]
-    struct Driver {
-        external: Option<Attached>,
+    struct Told {
+        conditions: Conditions,
     }
-    let driver = serde_yaml::from_str::<Driver>(settings).ok()?;
-    driver.external.filter(|attached| !attached.is_deterministic()).map(|_| MIXED)
+    let told = serde_yaml::from_str::<Told>(settings).ok()?;
+    told.conditions.external.filter(|attached| !attached.is_deterministic()).map(|_| MIXED)
 }
 
 /// A study's results, as its `results.json` has them.
@@ -79,21 +79,15 @@ const CAREFUL: &str = "careful";
 /// Nothing if they are of a version that wrote them otherwise.
 fn conditions(settings: &str) -> Vec<(&'static str, String)> {
     #[derive(serde::Deserialize)]
-    struct Conditions {
-        space: String,
-        roads: Vec<String>,
-        ads: String,
-        profile: Option<Profile>,
-        external: Option<Attached>,
-        traffic: Option<TrafficRecord>,
-        #[serde(default)]
-        ambient: u32,
+    struct Told {
+        conditions: Conditions,
         agent: Option<String>,
         seed: Option<u64>,
         /// A study has this in place of `seed`.
         first_seed: Option<u64>,
     }
-    let Ok(of) = serde_yaml::from_str::<Conditions>(settings) else { return Vec::new() };
+    let Ok(told) = serde_yaml::from_str::<Told>(settings) else { return Vec::new() };
+    let of = told.conditions;
     let program = of.external.as_ref().map(Attached::name);
     let driver = match &of.profile {
         None => program.unwrap_or(of.ads),
@@ -109,9 +103,9 @@ fn conditions(settings: &str) -> Vec<(&'static str, String)> {
         ("Space", Some(of.space)),
         ("Driving system", Some(driver)),
         ("Traffic", Some(traffic)),
-        ("Agent", of.agent),
+        ("Agent", told.agent),
         ("Roads", Some(of.roads.join(", "))),
-        ("Seed", of.seed.or(of.first_seed).map(|seed| seed.to_string())),
+        ("Seed", told.seed.or(told.first_seed).map(|seed| seed.to_string())),
     ];
     known.into_iter().filter_map(|(name, text)| Some((name, text?))).collect()
 }
@@ -122,8 +116,14 @@ mod tests {
 
     #[test]
     fn conditions_are_told_as_far_as_the_settings_have_them() {
-        let settings = "space: ../s.ava\nroads: [corner, boulevard]\nads: modular\nagent: random\nseed: 7\nambient: 5\nmore: 1";
-        let told = conditions(settings);
+        let settings = |more: &str| {
+            let known =
+                "avastra: 0.1.0, engine: plane/1, space: ../s.ava, space_digest: none, without: [], with: []";
+            format!(
+                "conditions: {{{known}, roads: [corner, boulevard], ads: modular{more}}}\nagent: random\nseed: 7\nmore: 1"
+            )
+        };
+        let told = conditions(&settings(", ambient: 5"));
         let text =
             |wanted: &str| told.iter().find(|(name, _)| *name == wanted).map(|(_, text)| text.as_str());
         assert_eq!(text("Space"), Some("../s.ava"));
@@ -131,7 +131,7 @@ mod tests {
         assert_eq!(text("Roads"), Some("corner, boulevard"));
         assert_eq!(text("Seed"), Some("7"));
         assert_eq!(text("Traffic"), Some("careful, 5 ambient"));
-        let calm = conditions("space: s.ava\nroads: [corner]\nads: modular");
+        let calm = conditions(&settings(""));
         assert!(calm.contains(&("Traffic", "careful".to_owned())), "{calm:?}");
         assert!(conditions("seed: 7").is_empty());
     }

@@ -115,15 +115,16 @@ fn conditions_text(chapter: &Chapter, played: &Played) -> String {
         "\n{} of {} cells of {}. Each is judged by {} under each of {}; all seeds follow from {}. \
          Played by avastra {}{}, world `{}`, against `{}`{}: {:.1} h simulated{}. Play it again: `{}`\n",
         played.cells.len(),
-        settings.agents.iter().map(|agent| agent.repeats as usize).sum::<usize>() * settings.roads.len(),
+        settings.agents.iter().map(|agent| agent.repeats as usize).sum::<usize>()
+            * settings.conditions.roads.len(),
         sizes.collect::<Vec<_>>().join(", "),
         counted(plan.episodes, "episode"),
         counted(plan.seeds, "seed"),
         settings.first_seed,
-        settings.avastra,
+        settings.conditions.avastra,
         commit.unwrap_or_default(),
-        settings.engine,
-        settings.ads,
+        settings.conditions.engine,
+        settings.conditions.ads,
         config.unwrap_or_default(),
         played.simulated_h(),
         took.unwrap_or_default(),
@@ -173,7 +174,7 @@ fn measure_table(measure: &str, played: &Played, roads: &[&MeasuredRoad]) -> Str
 fn published_text(published: &PublishedTable, played: &Played) -> String {
     let settings = &played.settings;
     let agents: Vec<&str> = settings.agents.iter().map(|agent| agent.label.as_str()).collect();
-    let roads: Vec<&str> = settings.roads.iter().map(String::as_str).collect();
+    let roads: Vec<&str> = settings.conditions.roads.iter().map(String::as_str).collect();
     let Agreement { figures, pairs } = Agreement::new(published, &agents, &roads, &played.cells);
     let mut text = format!("\nBeside {} (`{}`):\n", published.source, published.measure);
     if figures.is_empty() {
