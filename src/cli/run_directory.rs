@@ -109,13 +109,13 @@ pub fn from_record(directory: &Path, attached: Attached) -> Attached {
     Attached { settings: ExternalSettings { working_directory, ..attached.settings }, ..attached }
 }
 
-/// What every kind of settings begins with, and from where it is read.
+/// The fields with which all settings begin.
 #[derive(serde::Deserialize)]
 pub struct Begun {
     avastra: String,
     engine: String,
-    pub space: String,
-    space_digest: String,
+    pub space: Option<String>,
+    space_digest: Option<String>,
 }
 
 /// Settings of this version or of an earlier one, which had no `conditions`.
@@ -267,7 +267,9 @@ fn copied(directory: &Path, space: &str, digest: &str) -> Copied {
 pub fn remark_on_copy(directory: &Path) -> Option<String> {
     let kind = what_was_begun(directory).filter(|kind| kind.keeps_space)?;
     let text = load::read(&kind.settings(directory)).ok()?;
-    let Begun { space, space_digest, .. } = begun_in(&text)?;
+    let Begun { space: Some(space), space_digest: Some(space_digest), .. } = begun_in(&text)? else {
+        return None;
+    };
     let copy = directory.join(pack::SPACE);
     let copy = copy.shown();
     match copied(directory, &space, &space_digest) {

@@ -228,27 +228,43 @@ impl LaneGrid {
 
     /// Distance from a point to the nearest edge of a lane, m: negative on the lane, at most `reach_m`.
     pub fn least_room_m(&self, lanes: &[Lane], point: Vec2, reach_m: f64) -> f64 {
-        let room_m = |lane: LaneIndex, found: Projection| {
-            found.distance_m - lanes[lane.0].width_at(found.station_m) / 2.0
-        };
+        let mut least_m = reach_m;
+        self.visit(lanes, point, reach_m, |lane, found| {
+            least_m = smaller(least_m, found.distance_m - lanes[lane.0].width_at(found.station_m) / 2.0);
+            least_m
+        });
+        least_m
+    }
+
+    /// The nearest point of each lane as in [`LaneGrid::near`], the nearest lanes first. `visit` says how far beyond its edge, m, a lane
+    /// may be to matter still.
+    pub fn visit(
+        &self,
+        lanes: &[Lane],
+        point: Vec2,
+        reach_m: f64,
+        mut visit: impl FnMut(LaneIndex, Projection) -> f64,
+    ) {
         let Some(stretches) = self.stretches(point, reach_m) else {
-            let found = self.near(lanes, point, reach_m).into_iter();
-            return found.map(|(lane, found)| room_m(lane, found)).fold(reach_m, f64::min);
+            self.near(lanes, point, reach_m).into_iter().for_each(|(lane, found)| {
+                visit(lane, found);
+            });
+            return;
         };
         let nearest_m2 =
             |lane: &[(&Stretch, f64)]| lane.iter().map(|part| part.1).fold(f64::INFINITY, smaller);
-        let mut by_lane: Vec<_> = stretches.chunk_by(of_one_lane).collect();
-        by_lane.sort_by(|a, b| nearest_m2(a).total_cmp(&nearest_m2(b)));
-        let mut least_m = reach_m;
-        for parts in by_lane {
+        let mut by_lane: Vec<_> =
+            stretches.chunk_by(of_one_lane).map(|parts| (nearest_m2(parts), parts)).collect();
+        by_lane.sort_by(|(a_m2, _), (b_m2, _)| a_m2.total_cmp(b_m2));
+        let mut matters_m = f64::INFINITY;
+        for (nearest_m2, parts) in by_lane {
             // From here on every lane is farther away.
-            if nearest_m2(parts).sqrt() - SLACK_M - self.half_width_m > least_m {
+            if nearest_m2.sqrt() - SLACK_M - self.half_width_m > matters_m {
                 break;
             }
-            let found = nearest_of(&lanes[parts[0].0.lane.0].centre, parts, point);
-            least_m = least_m.min(room_m(parts[0].0.lane, found));
+            let lane = parts[0].0.lane;
+            matters_m = visit(lane, nearest_of(&lanes[lane.0].centre, parts, point));
         }
-        least_m
     }
 
     /// The nearest point of each lane whose centre comes within `reach_m` and half a lane width of a

@@ -384,22 +384,23 @@ impl RoadMap {
     /// two with the same heading the one with the nearer centre is meant.
     pub fn nearest(&self, point: Vec2, heading_rad: f64, reach_m: f64) -> Option<LanePlace> {
         let mut best: Option<(f64, f64, LanePlace)> = None;
-        for (index, projection) in self.grid.near(&self.lanes, point, reach_m) {
+        self.grid.visit(&self.lanes, point, reach_m, |index, projection| {
             let lane = self.lane(index);
             let beyond_m = (projection.distance_m - lane.width_at(projection.station_m) / 2.0).max(0.0);
-            if beyond_m > reach_m {
-                continue;
-            }
             let lane_heading_rad = lane.centre.heading_at(projection.station_m);
             let turn_rad = wrap_angle(lane_heading_rad - heading_rad).abs();
             let misfit = turn_rad + MISFIT_RAD_PER_M * projection.distance_m;
-            if best.is_none_or(|(best_m, best_misfit, _)| {
-                beyond_m < best_m - 1e-9 || (beyond_m < best_m + 1e-9 && misfit < best_misfit)
-            }) {
+            let is_better = best.is_none_or(|(best_m, best_misfit, found)| {
+                // Of two that fit alike the first counts.
+                let fits_better = misfit < best_misfit || misfit == best_misfit && index < found.lane;
+                beyond_m < best_m - 1e-9 || beyond_m < best_m + 1e-9 && fits_better
+            });
+            if beyond_m <= reach_m && is_better {
                 let (station_m, offset_m) = (projection.station_m, projection.offset_m);
                 best = Some((beyond_m, misfit, LanePlace { lane: index, station_m, offset_m }));
             }
-        }
+            best.map_or(reach_m, |(best_m, ..)| best_m)
+        });
         best.map(|(_, _, place)| place)
     }
 

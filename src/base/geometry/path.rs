@@ -54,8 +54,10 @@ pub struct Chord {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
     points: Vec<PathPoint>,
-    /// The unit vector along the heading of each vertex: on a straight segment it is that of every place.
+    /// The unit vector along the heading of each vertex.
     forwards: Vec<Vec2>,
+    /// Whether each segment is straight: both its vertices head along it.
+    straights: Vec<bool>,
     /// The segment that holds each of some evenly spread places: where the search for a station begins; with [`SURE`]
     /// where it ends there, too.
     cells: Vec<u32>,
@@ -73,6 +75,9 @@ const CELLS_PER_VERTEX: usize = 8;
 
 /// Marks a cell that lies in one segment, as do those beside it, so that rounding changes nothing.
 const SURE: u32 = 1 << 31;
+
+/// A segment whose end is less than this beside the heading of its beginning is straight, m.
+const STRAIGHT_M: f64 = 1e-6;
 
 /// A path turns at once by more than this, rad; less is rounding.
 const TURN_RAD_MIN: f64 = 1e-6;
@@ -197,11 +202,19 @@ impl Path {
         };
         let cells = (0..cell_count).map(|cell| segments[cell] | if is_sure(cell) { SURE } else { 0 });
         let forwards = points.iter().map(|point| unit_vector(wrap_angle(point.heading_rad)));
+        let forwards: Vec<Vec2> = forwards.collect();
+        let is_straight = |(pair, forward): (&[PathPoint], &Vec2)| {
+            let chord = pair[1].position - pair[0].position;
+            pair[0].heading_rad == pair[1].heading_rad
+                && forward.perp(&chord).abs() < STRAIGHT_M
+                && forward.dot(&chord) > 0.0
+        };
         Some(Path {
             cells: cells.collect(),
             cells_per_m,
             blocks: blocks.collect(),
-            forwards: forwards.collect(),
+            straights: points.windows(2).zip(&forwards).map(is_straight).collect(),
+            forwards,
             sharpest_per_m: points.iter().map(|point| point.curvature_per_m.abs()).fold(0.0, f64::max),
             points,
         })
@@ -323,7 +336,7 @@ impl Path {
         let (a, b) = (&self.points[index], &self.points[index + 1]);
         let begin = a.position + (b.position - a.position) * fraction;
         let reaches_to = to_m <= b.station_m || index + 2 == self.points.len();
-        if a.heading_rad == b.heading_rad && reaches_to && (fraction >= 0.0 || index == 0) {
+        if self.straights[index] && reaches_to && (fraction >= 0.0 || index == 0) {
             let heading_rad = wrap_angle(a.heading_rad);
             return Chord { begin, forward: self.forwards[index], heading_rad, is_straight: true };
         }
@@ -376,8 +389,7 @@ impl Path {
         for _ in 0..5 {
             let (index, fraction) = self.locate(station_m);
             let (a, b) = (&self.points[index], &self.points[index + 1]);
-            let is_straight = a.heading_rad == b.heading_rad;
-            let forward = match is_straight {
+            let forward = match a.heading_rad == b.heading_rad {
                 true => self.forwards[index],
                 false => unit_vector(heading_between(a, b, fraction)),
             };
@@ -385,7 +397,7 @@ impl Path {
             let ahead_m = forward.dot(&away);
             station_m += ahead_m;
             // On a straight segment one step leads there.
-            let stays = is_straight
+            let stays = self.straights[index]
                 && (station_m >= a.station_m || index == 0)
                 && (station_m <= b.station_m || index + 2 == self.points.len());
             if stays || ahead_m.abs() < 0.02 {
@@ -624,6 +636,18 @@ mod tests {
         let part = path.part(3.0, 9.0).expect("six metres");
         assert!((part.length_m() - 6.0).abs() < 1e-9);
         assert!((part.pose_at(0.0).position - path.pose_at(3.0).position).norm() < 1e-9);
+    }
+
+    #[test]
+    fn a_zigzag_is_not_straight_though_its_corners_head_alike() {
+        let corners =
+            [(0.0, 0.0), (10.0, 1.0), (20.0, 0.0), (30.0, 1.0)].map(|(x_m, y_m)| Vec2::new(x_m, y_m));
+        let path = Path::through(&corners).expect("a way");
+        for at_m in [11.0, 14.0, 17.0, 21.0] {
+            let chord = path.chord(at_m, at_m + 2.5);
+            let along = path.position_at(at_m + 2.5) - path.position_at(at_m);
+            assert!((chord.forward - along.normalize()).norm() < 1e-9 && !chord.is_straight, "{at_m}");
+        }
     }
 
     proptest! {

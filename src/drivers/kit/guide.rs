@@ -18,7 +18,7 @@ use super::speed::PREVIEW_S;
 
 /// Distance between samples, m. On the tightest bend a car can drive (5 m) the chord is 6 mm off.
 const SPACING_M: f64 = 0.5;
-/// A search looks at every so many samples first, one in 8 m, and goes on from the nearest of them.
+/// A search first checks every 16th sample (8 m), and goes on from the nearest of them.
 const STRIDE: usize = 16;
 
 /// How far before and behind its last place a vehicle is looked for, m: more than it drives or errs
@@ -31,14 +31,12 @@ const POSITION_ERROR_M: f64 = 2.0;
 /// Most steps along tangents until a place has settled; in a bend each step leaves a fraction of the error.
 const SLIDES_MAX: usize = 8;
 
-/// Added to a small number before its fraction is cut off, and taken away again without a half: it is rounded.
+/// Rounds to the nearest integer: adding it makes a number above -1024 positive before its fraction is cut off.
 const HALF_UP: f64 = 1024.5;
 
-/// Headings that differ by less belong to one straight piece, rad: 1 mm on 100 m.
+/// Samples whose headings and places differ by less from those on a line belong to one straight piece, rad and m.
 const STRAIGHT_RAD: f64 = 1e-5;
-
-/// A stretch that turns by less, rad, has no two pieces in reach of one place but next to its bend.
-const SIMPLE_RAD: f64 = 1.0;
+const STRAIGHT_M: f64 = 1e-3;
 
 /// Step of the differences that give the slope of a guide beside the path, m.
 const H_M: f64 = 0.25;
@@ -78,6 +76,8 @@ impl SpeedRules {
 #[derive(Debug, Clone)]
 pub struct Guide {
     samples: Vec<Sample>,
+    /// The greatest distance between two neighbours, m: outside a bend of the route it is more than [`SPACING_M`].
+    spacing_m_max: f64,
     /// How far from the ego vehicle road users are looked for along it, m.
     range_m: f64,
     is_motorway: bool,
@@ -96,18 +96,22 @@ struct Sample {
     turned_rad: f64,
 }
 
-/// Notes where the guide is straight, and how far it turns. On straight pieces, samples have the same heading to within rounding.
+/// Notes where the guide is straight, and how far it turns.
 fn note_turns(samples: &mut [Sample]) {
     for index in 1..samples.len() {
         let turn_rad = wrap_angle(samples[index].heading_rad - samples[index - 1].heading_rad).abs();
         samples[index].turned_rad = samples[index - 1].turned_rad + turn_rad;
     }
-    let is_even =
-        |a: &Sample, b: &Sample| (a.forward - b.forward).norm_squared() < STRAIGHT_RAD * STRAIGHT_RAD;
     let mut first = 0;
     while first < samples.len() {
-        let last =
-            first + samples[first..].iter().take_while(|next| is_even(&samples[first], next)).count() - 1;
+        let Sample { position, forward, .. } = samples[first];
+        let is_on_line = |(nth, sample): &(usize, &Sample)| {
+            let expected = position + forward * (*nth as f64 * SPACING_M);
+            (sample.forward - forward).norm_squared() < STRAIGHT_RAD * STRAIGHT_RAD
+                && (sample.position - expected).norm_squared() < STRAIGHT_M * STRAIGHT_M
+        };
+        let on_line = samples[first..].iter().enumerate().take_while(is_on_line).count();
+        let last = first + on_line.max(1) - 1;
         samples[first..=last].iter_mut().for_each(|sample| sample.straight = [first as u32, last as u32]);
         first = last + 1;
     }
@@ -168,8 +172,13 @@ impl Guide {
             let reachable_mps = (next_mps * next_mps + 2.0 * rules.slowdown_mps2 * SPACING_M).sqrt();
             samples[index].speed_mps_max = samples[index].speed_mps_max.min(reachable_mps);
         }
+        Guide::of_samples(samples, scene.range_m, scene.is_motorway)
+    }
+
+    fn of_samples(mut samples: Vec<Sample>, range_m: f64, is_motorway: bool) -> Guide {
         note_turns(&mut samples);
-        Guide { samples, range_m: scene.range_m, is_motorway: scene.is_motorway }
+        let spacings_m = samples.windows(2).map(|pair| (pair[1].position - pair[0].position).norm());
+        Guide { spacing_m_max: spacings_m.fold(0.0, f64::max), samples, range_m, is_motorway }
     }
 
     /// Through poses, one after another, of which two may be at the same place; and the station of each, m. There is
@@ -210,9 +219,8 @@ impl Guide {
                 turned_rad: 0.0,
             }
         };
-        let mut samples: Vec<Sample> = (0..count).map(sample).collect();
-        note_turns(&mut samples);
-        (Guide { samples, range_m: RANGE_M, is_motorway: false }, stations_m)
+        let samples = (0..count).map(sample).collect();
+        (Guide::of_samples(samples, RANGE_M, false), stations_m)
     }
 
     /// How far vehicles are sensed where it leads, m.
@@ -267,24 +275,24 @@ impl Guide {
     /// The place of a vehicle that was lately at station `near_m`; with `None` the whole route is searched.
     pub fn locate(&self, point: Vec2, near_m: Option<f64>) -> Beside {
         let Some(near_m) = near_m else { return self.beside_sample(point, self.first_near(point)) };
-        let within = Stretch { first: self.index(near_m - NEAR_M), last: self.index(near_m + NEAR_M) };
+        let within = self.stretch(near_m - NEAR_M, near_m + NEAR_M);
         let found = self.slide(point, self.index(near_m), within);
         self.beside_sample(point, found.unwrap_or_else(|| self.nearest(point, within)).index)
     }
 
     /// The nearest place of the route between two stations.
     pub fn project(&self, point: Vec2, from_m: f64, to_m: f64) -> Beside {
-        let within = Stretch { first: self.index(from_m), last: self.index(to_m) };
+        let within = self.stretch(from_m, to_m);
         self.beside_sample(point, self.nearest(point, within).index)
     }
 
     /// Follows a moving point as far as it is within reach of the guide between two stations, most often without a search.
     pub fn trace(&self, point: Vec2, from_m: f64, to_m: f64, reach_m: f64) -> Tracer<'_> {
-        let within = Stretch { first: self.index(from_m), last: self.index(to_m) };
+        let within = self.stretch(from_m, to_m);
         let reach_m = reach_m + SPACING_M;
         let nearest = self.nearest_within(point, within, reach_m);
         let turns_rad = self.samples[within.last].turned_rad - self.samples[within.first].turned_rad;
-        Tracer { guide: self, within, reach_m, is_simple: turns_rad.abs() < SIMPLE_RAD, point, nearest }
+        Tracer { guide: self, within, reach_m, is_straight: turns_rad < STRAIGHT_RAD, point, nearest }
     }
 
     fn beside_sample(&self, point: Vec2, index: usize) -> Beside {
@@ -334,11 +342,12 @@ impl Guide {
             index += STRIDE;
         }
         // No sample is farther than half a stride from one that was looked at.
-        let least_m = best.distance_m2.sqrt() - (STRIDE / 2) as f64 * SPACING_M;
+        let least_m = best.distance_m2.sqrt() - (STRIDE / 2) as f64 * self.spacing_m_max;
         if least_m > reach_m {
             return Err(least_m);
         }
-        let slid = self.slide(point, best.index, within);
+        // Far aside, a tangent may lead to another piece, which is farther away.
+        let slid = self.slide(point, best.index, within).filter(|slid| slid.distance_m2 <= best.distance_m2);
         let best = slid.unwrap_or_else(|| self.descend(point, best.index, within));
         let distance_m = best.distance_m2.sqrt();
         if distance_m <= reach_m { Ok(best) } else { Err(distance_m) }
@@ -389,6 +398,11 @@ impl Guide {
         best
     }
 
+    fn stretch(&self, from_m: f64, to_m: f64) -> Stretch {
+        let first = self.index(from_m);
+        Stretch { first, last: self.index(to_m).max(first) }
+    }
+
     fn index(&self, station_m: f64) -> usize {
         // The conversion makes 0 of what is negative.
         ((station_m / SPACING_M) as u32 as usize).min(self.samples.len() - 1)
@@ -421,8 +435,8 @@ pub struct Tracer<'a> {
     guide: &'a Guide,
     within: Stretch,
     reach_m: f64,
-    /// Whether the stretch turns so little that no two pieces of it pass one place within reach.
-    is_simple: bool,
+    /// Whether the stretch is straight: what is out of reach of one piece of it is out of reach of all.
+    is_straight: bool,
     /// The last position that was looked for, and its nearest sample; or the least distance of any, if it is out of reach.
     point: Vec2,
     nearest: Result<Nearest, f64>,
@@ -468,7 +482,7 @@ impl Tracer<'_> {
         }
         let slid = self.nearest.ok().and_then(|from| self.guide.slide(point, from.index, self.within));
         // A point that is out of reach of the stretch near by may be in reach of another bend.
-        let counts = |nearest: &Nearest| self.is_simple || self.is_near(nearest);
+        let counts = |nearest: &Nearest| self.is_straight || self.is_near(nearest);
         let search = || self.guide.nearest_within(point, self.within, self.reach_m);
         self.nearest = slid.filter(counts).map_or_else(search, Ok);
         self.point = point;
@@ -507,6 +521,38 @@ mod tests {
         assert!((place.station_m - 80.0).abs() < 0.1, "{place:?}");
     }
 
+    /// The distance to the nearest sample of a stretch, by looking at each.
+    fn nearest_m(guide: &Guide, point: Vec2, from_m: f64, to_m: f64) -> f64 {
+        let within = guide.stretch(from_m, to_m);
+        let all = (within.first..=within.last).map(|index| guide.squared_m2(point, index));
+        all.fold(f64::INFINITY, f64::min).sqrt()
+    }
+
+    #[test]
+    fn near_the_way_searches_find_what_a_look_at_each_sample_finds() {
+        let guide = Guide::new(&winding(), &SpeedRules::TOWN);
+        for (from_m, to_m) in [(0.0, 360.0), (100.0, 130.0), (120.0, 150.0), (60.0, 200.0)] {
+            for case in 0..3000 {
+                let near = guide.pose_at(f64::from(case % 360));
+                let point = near.offset(0.0, f64::from(case % 23) - 11.0).position;
+                let within = guide.stretch(from_m, to_m);
+                let least_m = nearest_m(&guide, point, from_m, to_m);
+                if least_m < 12.0 {
+                    assert!(guide.nearest(point, within).distance_m2.sqrt() < least_m + 1e-9, "case {case}");
+                }
+                // A long body that comes from far off, step by step.
+                let reach_m = 9.0;
+                let step = unit_vector(f64::from(case)) * 1.9;
+                let mut tracer = guide.trace(point - step * 12.0, from_m, to_m, reach_m);
+                for moment in 1..=24 {
+                    let there = point + step * f64::from(moment - 12);
+                    let is_in_reach = nearest_m(&guide, there, from_m, to_m) <= reach_m;
+                    assert!(tracer.next(there).is_some() || !is_in_reach, "case {case}, moment {moment}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn a_moving_point_is_followed_as_if_searched_anew() {
         let guide = Guide::new(&winding(), &SpeedRules::TOWN);
@@ -524,12 +570,7 @@ mod tests {
                 let anew = guide.project(point, from_m, to_m);
                 match tracer.next(point) {
                     Some(beside) => {
-                        // A search may end a few samples beyond the stretch, on another tangent.
-                        let inside = (from_m..to_m).contains(&anew.station_m);
-                        assert!(
-                            beside == anew || !inside,
-                            "case {case}, moment {moment}: {beside:?} {anew:?}"
-                        );
+                        assert_eq!(beside, anew, "case {case}, moment {moment}");
                         near += 1;
                     }
                     None => {

@@ -207,7 +207,7 @@ impl Idm {
         let mut tracer = self.guide().trace(position, from_m, to_m, reach_m);
         let now = tracer.here().or_else(|| tracer.behind());
         if let Some((beside, span)) = now.and_then(|beside| Some((beside, taken(&beside)?))) {
-            // On a motorway who is behind keeps the distance, also on the way into the lane. Once its middle is behind the
+            // On a motorway a vehicle behind keeps its distance, also on the way into the lane. Once its middle is behind the
             // front, the ego vehicle is past it.
             let follows = self.scene.is_motorway && beside.station_m < rear_m;
             return (!follows && span.middle_m() > front_m - BESIDE_M).then(|| Ahead {

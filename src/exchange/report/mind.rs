@@ -31,6 +31,8 @@ pub struct Mind {
     looks: usize,
     plans: Vec<Vec<Vec2>>,
     hit: BTreeSet<u32>,
+    /// The collision probability of the last frame.
+    probability: f64,
 }
 
 /// At a tick.
@@ -56,7 +58,7 @@ impl Mind {
     pub fn note(&mut self, world: &World, ads: &dyn Ads, contacts: &[Contact]) {
         self.hit.extend(contacts.iter().map(|contact| contact.obstacle));
         let danger = ProcKind::default().danger(world, &|id| self.hit.contains(&id));
-        let before = self.commands.last().map_or(0.0, |command| command.probability);
+        self.probability = danger.map_or(self.probability, |now| now.probability);
         let status = ads.status();
         let motion = world.ego();
         self.commands.push(Command {
@@ -64,7 +66,7 @@ impl Mind {
             steer_rad: motion.steer_rad,
             throttle_pct: status.control.throttle_pct,
             brake_pct: status.control.brake_pct,
-            probability: if contacts.is_empty() { danger.map_or(before, |now| now.probability) } else { 1.0 },
+            probability: if contacts.is_empty() { self.probability } else { 1.0 },
         });
         if world.ticks().is_multiple_of(FRAME_TICKS) {
             self.look(world.ticks(), status);
@@ -98,7 +100,7 @@ impl Mind {
         }
     }
 
-    /// Columns of what is commanded at each tick, of what it leads to and of the collision probability.
+    /// Columns of what is commanded at each tick, of what it leads to and of the collision probability of the last frame.
     pub fn commands(&self, columns: &mut Columns) -> Value {
         let mut add = |step: f64, of: fn(&Command) -> f64| columns.add(step, self.commands.iter().map(of));
         json!({

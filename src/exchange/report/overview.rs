@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use avastra_campaign::estimate::FRAME;
 use avastra_campaign::oracle::MIXED;
-use avastra_campaign::run::{Conditions, Database, DatabaseError, HeatMap, RequirementCount, TrafficRecord};
+use avastra_campaign::run::{Database, DatabaseError, HeatMap, Profile, RequirementCount, TrafficRecord};
 use avastra_drivers::external::Attached;
 use avastra_world::action::ActionTable;
 
@@ -52,12 +52,8 @@ fn requirements(database: &Database, table: Option<&ActionTable>) -> Result<Vec<
 
 /// What is added to recurrences where the driving system says that it is not deterministic.
 fn mixed(settings: &str) -> Option<&'static str> {
-    #[derive(serde::Deserialize)]
-    struct Told {
-        conditions: Conditions,
-    }
-    let told = serde_yaml::from_str::<Told>(settings).ok()?;
-    told.conditions.external.filter(|attached| !attached.is_deterministic()).map(|_| MIXED)
+    let told = told_in(settings)?;
+    told.external.filter(|attached| !attached.is_deterministic()).map(|_| MIXED)
 }
 
 /// A study's results, as its `results.json` has them.
@@ -72,22 +68,39 @@ pub fn of_estimate(results: &Value, settings: &str) -> Value {
     })
 }
 
+/// What a page says of settings.
+#[derive(serde::Deserialize)]
+struct Told {
+    space: String,
+    roads: Vec<String>,
+    ads: String,
+    profile: Option<Profile>,
+    external: Option<Attached>,
+    traffic: Option<TrafficRecord>,
+    #[serde(default)]
+    ambient: u32,
+    agent: Option<String>,
+    seed: Option<u64>,
+    /// A study has this in place of `seed`.
+    first_seed: Option<u64>,
+}
+
+/// Reads settings of earlier versions, too, in which nothing stood under `conditions`.
+fn told_in(settings: &str) -> Option<Told> {
+    let mut fields: serde_json::Map<String, Value> = serde_yaml::from_str(settings).ok()?;
+    if let Some(Value::Object(conditions)) = fields.remove("conditions") {
+        fields.extend(conditions);
+    }
+    serde_json::from_value(Value::Object(fields)).ok()
+}
+
 /// The traffic profile of runs that ask for none.
 const CAREFUL: &str = "careful";
 
 /// What was played against what, by the settings of a run, a training, a study or an estimate: name and text of each.
 /// Nothing if they are of a version that wrote them otherwise.
 fn conditions(settings: &str) -> Vec<(&'static str, String)> {
-    #[derive(serde::Deserialize)]
-    struct Told {
-        conditions: Conditions,
-        agent: Option<String>,
-        seed: Option<u64>,
-        /// A study has this in place of `seed`.
-        first_seed: Option<u64>,
-    }
-    let Ok(told) = serde_yaml::from_str::<Told>(settings) else { return Vec::new() };
-    let of = told.conditions;
+    let Some(of) = told_in(settings) else { return Vec::new() };
     let program = of.external.as_ref().map(Attached::name);
     let driver = match &of.profile {
         None => program.unwrap_or(of.ads),
@@ -103,9 +116,9 @@ fn conditions(settings: &str) -> Vec<(&'static str, String)> {
         ("Space", Some(of.space)),
         ("Driving system", Some(driver)),
         ("Traffic", Some(traffic)),
-        ("Agent", told.agent),
+        ("Agent", of.agent),
         ("Roads", Some(of.roads.join(", "))),
-        ("Seed", told.seed.or(told.first_seed).map(|seed| seed.to_string())),
+        ("Seed", of.seed.or(of.first_seed).map(|seed| seed.to_string())),
     ];
     known.into_iter().filter_map(|(name, text)| Some((name, text?))).collect()
 }
@@ -116,14 +129,8 @@ mod tests {
 
     #[test]
     fn conditions_are_told_as_far_as_the_settings_have_them() {
-        let settings = |more: &str| {
-            let known =
-                "avastra: 0.1.0, engine: plane/1, space: ../s.ava, space_digest: none, without: [], with: []";
-            format!(
-                "conditions: {{{known}, roads: [corner, boulevard], ads: modular{more}}}\nagent: random\nseed: 7\nmore: 1"
-            )
-        };
-        let told = conditions(&settings(", ambient: 5"));
+        let settings = "conditions: {space: ../s.ava, roads: [corner, boulevard], ads: modular, ambient: 5}\nagent: random\nseed: 7";
+        let told = conditions(settings);
         let text =
             |wanted: &str| told.iter().find(|(name, _)| *name == wanted).map(|(_, text)| text.as_str());
         assert_eq!(text("Space"), Some("../s.ava"));
@@ -131,7 +138,7 @@ mod tests {
         assert_eq!(text("Roads"), Some("corner, boulevard"));
         assert_eq!(text("Seed"), Some("7"));
         assert_eq!(text("Traffic"), Some("careful, 5 ambient"));
-        let calm = conditions(&settings(""));
+        let calm = conditions("space: s.ava\nroads: [corner]\nads: modular");
         assert!(calm.contains(&("Traffic", "careful".to_owned())), "{calm:?}");
         assert!(conditions("seed: 7").is_empty());
     }

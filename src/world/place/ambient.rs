@@ -16,6 +16,8 @@ use avastra_lang::model::body;
 use avastra_lang::model::command::IgnoredRules;
 use avastra_lang::model::vocabulary::{Body, BodyClass, Colour, Verb, Word};
 
+use avastra_road::is_apart;
+
 use crate::scene::lanes::may_use;
 use crate::scene::way::Way;
 use crate::state::ambient::Ambient;
@@ -83,7 +85,11 @@ fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<RoadU
     let around_m = around.scene.range_m + AROUND_M;
     let here = centre.position_at(station_m);
     let away = here - around.ego_outline.pose.position;
-    let is_taken = |other: &Obstacle| (other.outline.pose.position - here).norm_squared() < ROOM_M * ROOM_M;
+    let height_m = around.scene.map.lane(lane).height_at(station_m);
+    let is_taken = |other: &Obstacle| {
+        let away = other.outline.pose.position - here;
+        away.norm_squared() < ROOM_M * ROOM_M && !is_apart(height_m, other.elevation_m)
+    };
     if !(nearest_m * nearest_m..around_m * around_m).contains(&away.norm_squared())
         || !(size.length_m..centre.length_m() - STREET_END_M).contains(&station_m)
         || around.obstacles().any(is_taken)

@@ -155,7 +155,7 @@ traced! {
     // The way that it leads to follows from the lane that it leaves and the side.
     Change { to_station_m, progress, duration_s, ends_m, broken_off } but { to };
     BrokenOff { progress, duration_s };
-    Aside { lane, was_told_midway, wanted_m, now_m, told, shift };
+    Aside { was_told_midway, lane, wanted_m, now_m, told, shift };
     Shift { from_m, to_m, progress, duration_s };
 }
 

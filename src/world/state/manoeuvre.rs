@@ -68,7 +68,7 @@ pub enum Stage {
 traced! {
     Running { course, phase, stage, since, tracked };
     Tracked { course, phase, first };
-    // Of what was told, what is still asked: the rest was handed over as it was told.
+    // Only what later ticks read: the driver has the rest.
     Command {
         speed_mps, rate_mps2, turn => turn.is_some(),
         lane => lane.is_some(), offset_m => offset_m.is_some(),

@@ -33,7 +33,7 @@ pub struct Mover {
     pub rest_ticks: u32,
     /// Part of it that the ego vehicle's sensors saw when they last looked.
     pub visible_fraction: f64,
-    /// How far it is from all others.
+    /// Who is near it, and how far the next one is.
     pub room: Room,
     /// Which of the two has priority: it or the ego vehicle.
     pub rights: Rights,
@@ -158,7 +158,7 @@ impl Mover {
     }
 }
 
-/// Who was near a road user when that was last looked at. Until it and others have come far, it touches nobody else.
+/// The road users near this one when it last looked. Until the ways driven since exceed `gap_m`, it can touch no other.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Room {
     /// One bit for each of the first 64 road users, by index: who was near.

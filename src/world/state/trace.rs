@@ -60,7 +60,8 @@ impl Trace {
     }
 }
 
-/// Stands for what is not there. No number and no count has these bits.
+/// Stands for what is not there. No number and no count has these bits. A struct that may be absent must not begin with a field that
+/// may be absent, too.
 const NOTHING: u64 = 0x7ff8_7e3d_91a5_0c42;
 
 /// State whose every bit goes into a trace.
@@ -68,8 +69,11 @@ pub trait Traced {
     fn trace(&self, trace: &mut Trace);
 }
 
-/// Feeds the fields of plain structs to a trace, in this order: all of them, or what stands after `=>` in place of one, but those
-/// that are named after `but`. A field that is forgotten does not compile. `traced!(enum …)`: enums without data.
+/// Implements [`Traced`] for plain structs: `traced! { Name { a, b => b.len() } but { c }; }`.
+///
+/// - It feeds the fields in this order; what stands after `=>` in place of a field.
+/// - It leaves out the fields after `but`. A field in neither list does not compile.
+/// - `traced!(enum A, B)` is for enums without data.
 macro_rules! traced {
     (@ $trace:ident, $field:ident) => { $crate::state::trace::Traced::trace($field, $trace) };
     (@ $trace:ident, $field:ident, $word:expr) => { $crate::state::trace::Traced::trace(&$word, $trace) };

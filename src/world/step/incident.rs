@@ -30,8 +30,8 @@ pub struct Bump {
     pub incident: Incident,
 }
 
-/// The first obstacle in the way when the obstacle at `index` moves to `end`, in the tick after `tick`. Of the first 64 only
-/// those whose bit is set in `near` are looked at.
+/// The first obstacle in the way when the obstacle at `index` moves to `end`, in the tick after `tick`. It looks at the road users
+/// whose bit is set in `near`, and at all from index 64 on.
 pub fn bump(users: &[RoadUser], index: usize, near: u64, end: &Pose, tick: u64) -> Option<Bump> {
     let this = &users[index].obstacle;
     let outline = &this.outline;

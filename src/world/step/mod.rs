@@ -192,7 +192,7 @@ impl World {
         debug_assert_eq!(
             bumped,
             bump(users, index, u64::MAX, &moved.pose, self.ticks),
-            "somebody near is missed"
+            "a road user near by is missed"
         );
         if let Some(Bump { other, pose, normal, incident }) = bumped {
             // Obstacles that touch already push where the one that moves goes.
@@ -257,7 +257,7 @@ impl World {
     }
 
     /// The road users that the one at `index` may touch on its way to `end`: one bit for each of the first 64.
-    /// Who stood far apart need not be looked at again until the two can have come together.
+    /// A pair that was far apart is checked again only when both could have closed the gap.
     fn near(&self, users: &mut [RoadUser], index: usize, end: &Pose) -> u64 {
         let Travel { done_m, now_m } = self.travel;
         let outline = users[index].obstacle.outline;
@@ -293,9 +293,10 @@ impl World {
     /// Brings up to date what is seen along the lines of sight from the ego vehicle's roof.
     fn look(&mut self) {
         let eye = self.ego.outline.pose.position;
-        let has_levels = self.scene.map.has_levels;
-        for index in 0..if has_levels { self.users.len() } else { 0 } {
-            self.users[index].obstacle.is_apart = self.alone().is_apart_from_ego(&self.users[index]);
+        if self.scene.map.has_levels {
+            for index in 0..self.users.len() {
+                self.users[index].obstacle.is_apart = self.alone().is_apart_from_ego(&self.users[index]);
+            }
         }
         for index in 0..self.users.len() {
             let target = &self.users[index].obstacle;

@@ -281,7 +281,7 @@ impl<'a> Walk<'a> {
     pub fn to(&mut self, map: &'a RoadMap, course: &Course, ahead_m: f64) -> (Segment<'a>, f64) {
         let station_m = course.station_m + ahead_m;
         if let Some(segment) = &self.segment
-            && station_m - self.begin_m < segment.to_m
+            && (segment.begin.station_m..segment.to_m).contains(&(station_m - self.begin_m))
         {
             return (*segment, station_m - self.begin_m - segment.begin.station_m);
         }

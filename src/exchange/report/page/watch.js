@@ -296,7 +296,7 @@ function precision(steps) {
     "p",
     { class: "muted fine" },
     `Drawn from numbers that are exact to ±${steps.place_m * 1000} mm, ±${steps.heading_rad * 1000} mrad, ` +
-      `±${steps.speed_mps} m/s and ±${steps.probability} (ProC) at every tick of ${steps.tick_s} s; plans and ` +
+      `±${steps.speed_mps} m/s and ±${steps.probability} (ProC, every 0.1 s) at every tick of ${steps.tick_s} s; plans and ` +
       `predictions to ±${steps.sketch_m * 100} cm every ${steps.thought_s} s, what is perceived every ` +
       `${steps.perceived_s} s. Between ticks places are interpolated.`,
   );

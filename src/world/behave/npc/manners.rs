@@ -134,12 +134,16 @@ impl Driver {
         let near = |area: &&Area| area.from_m <= front_m + reach_m;
         let near_areas = || areas[open..].iter().take_while(near);
         let lanes = near_areas().fold(LaneSet::default(), |lanes, area| lanes.with(area.other));
-        // Most often nobody comes near on any of their lanes.
-        let minds_others = !self.ignores.contains(TrafficRule::Others)
+        let may_mind = !self.ignores.contains(TrafficRule::Others);
+        // Most often no vehicle comes near on any of their lanes.
+        let minds_others = may_mind
             && view.around.drivers().any(|(obstacle, _, driver)| {
                 driver.way.lane_set.may_meet(lanes) && is_near(obstacle, view.this)
             });
-        let waited_for = near_areas().position(|area| self.must_wait(area, minds_others, view))?;
+        let waits_for = |minds_others| near_areas().position(|area| self.must_wait(area, minds_others, view));
+        let waited_for = waits_for(minds_others);
+        debug_assert_eq!(waited_for, waits_for(may_mind), "a vehicle at the junction is missed");
+        let waited_for = waited_for?;
         // It must not wait in an earlier area either, unless its front is in that already.
         let mut hold_m = areas[open + waited_for].from_m;
         for area in areas[open..open + waited_for].iter().rev() {

@@ -36,7 +36,7 @@ impl Strip {
     pub fn of(this: &Obstacle, around: &Around) -> Strip {
         let route = &around.scene.route;
         let position = this.outline.pose.position;
-        // In bends the way to it is longer than the distance; farther along the route another branch passes it.
+        // In bends the route is up to twice as long as the straight line. A branch of the route that comes back later is not meant.
         let away_m = (position - around.ego.rear_axle.position).norm();
         let reach_m = 2.0 * away_m + around.ego_offset_m.abs();
         let found = route.path.project_near(position, around.ego_station_m, reach_m);
