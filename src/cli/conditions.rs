@@ -31,7 +31,8 @@ pub fn settings(
     Ok(RunSettings::new(conditions, agent, episodes, arguments.seed))
 }
 
-/// On which roads fewer vehicles of ambient traffic are there at the start than were asked for; nothing if all are.
+/// On which roads fewer vehicles of ambient traffic are there at the start of the first episode than were asked for; nothing if all
+/// are.
 pub fn ambient_text(run: &Run) -> Option<String> {
     let wanted = run.settings().conditions.ambient;
     if wanted == 0 {
@@ -41,7 +42,7 @@ pub fn ambient_text(run: &Run) -> Option<String> {
     let roads: Vec<String> = lacking.map(|(road, found)| format!("{found} on {road}")).collect();
     (!roads.is_empty()).then(|| {
         let roads = roads.join(", ");
-        format!("of {wanted} vehicles of ambient traffic, at the start there are {roads}; more come where there is room")
+        format!("of {wanted} vehicles of ambient traffic, at the start of its first episode there are {roads}; more come where there is room")
     })
 }
 

@@ -225,7 +225,7 @@ pub fn read(directory: &Path) -> Result<Contents, Failure> {
     if run_directory::lost(&file).is_some() {
         return Ok(Contents { settings: text, results: None, damaged: None, remarks: Vec::new() });
     }
-    let settings: EstimateSettings = load::parsed(&path, &text)?;
+    let settings: EstimateSettings = run_directory::settings_in(directory, &text)?;
     let unread = |error| Failure::file("read", &file, error);
     let (database, damaged) = run_directory::open_to_read::<EstimateDatabase>(&file, &text)?;
     let scenarios = database.scenarios().map_err(unread)?;

@@ -253,7 +253,7 @@ fn of_run(
         remarks.extend(run_directory::foreign_text(&kind, directory, &written));
     }
     remarks.extend(run_directory::remark_on_copy(directory));
-    let space = run_directory::begun_in(settings).and_then(|begun| Some(directory.join(begun.space?)));
+    let space = run_directory::begun_in(settings).and_then(|(begun, _)| Some(directory.join(begun.space?)));
     // A page of what was found is worth having without the names of the rows.
     let table: Option<ActionTable> = space.and_then(|space| load::table(output, &space).ok());
     if table.is_none() {

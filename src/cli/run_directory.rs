@@ -126,11 +126,11 @@ enum Written {
     Before(Begun),
 }
 
-/// What settings begin with, of any kind and version.
-pub fn begun_in(text: &str) -> Option<Begun> {
+/// What settings begin with, of any kind and version, and whether they have no `conditions` yet.
+pub fn begun_in(text: &str) -> Option<(Begun, bool)> {
     match serde_yaml::from_str(text).ok()? {
-        Written::Now { conditions } => Some(conditions),
-        Written::Before(begun) => Some(begun),
+        Written::Now { conditions } => Some((conditions, false)),
+        Written::Before(begun) => Some((begun, true)),
     }
 }
 
@@ -267,7 +267,7 @@ fn copied(directory: &Path, space: &str, digest: &str) -> Copied {
 pub fn remark_on_copy(directory: &Path) -> Option<String> {
     let kind = what_was_begun(directory).filter(|kind| kind.keeps_space)?;
     let text = load::read(&kind.settings(directory)).ok()?;
-    let Begun { space: Some(space), space_digest: Some(space_digest), .. } = begun_in(&text)? else {
+    let (Begun { space: Some(space), space_digest: Some(space_digest), .. }, _) = begun_in(&text)? else {
         return None;
     };
     let copy = directory.join(pack::SPACE);
@@ -321,19 +321,35 @@ fn tidy(directory: &Path) -> Result<(), Failure> {
 
 /// The settings of a directory and their text, if they were written by this version of avastra.
 pub fn settings_of<C: Campaign>(directory: &Path) -> Result<(C, String), Failure> {
-    let (what, path) = (C::KIND.what, C::KIND.settings(directory));
-    let text = load::text(&path)?;
+    let text = load::text(&C::KIND.settings(directory))?;
     // Settings of another version may have other fields: this comes first.
-    let begun = begun_in(&text);
-    if let Some(begun) = begun.filter(|begun| (&*begun.engine, &*begun.avastra) != (ENGINE, VERSION)) {
-        return Err(Failure::usage(format!(
-            "the {what} in `{}` was begun by avastra {} in world `{}`, this is avastra {VERSION} in `{ENGINE}`: begin a new one",
-            directory.shown(),
-            begun.avastra,
-            begun.engine
-        )));
+    match begun_elsewhere::<C>(directory, &text) {
+        Some(failure) => Err(failure),
+        None => Ok((settings_in(directory, &text)?, text)),
     }
-    Ok((load::parsed(&path, &text)?, text))
+}
+
+/// What the settings of a directory say, whichever version wrote them.
+///
+/// # Errors
+/// If they have another form: that another avastra wrote them, or else the reason with its place.
+pub fn settings_in<C: Campaign>(directory: &Path, text: &str) -> Result<C, Failure> {
+    let settings = load::parsed(&C::KIND.settings(directory), text);
+    settings.map_err(|failure| begun_elsewhere::<C>(directory, text).unwrap_or(failure))
+}
+
+/// That another avastra wrote the settings of a directory, if it did.
+fn begun_elsewhere<C: Campaign>(directory: &Path, text: &str) -> Option<Failure> {
+    let (begun, is_earlier) = begun_in(text)?;
+    let is_other = is_earlier || (&*begun.engine, &*begun.avastra) != (ENGINE, VERSION);
+    let (what, shown, Begun { avastra, engine, .. }) = (C::KIND.what, directory.shown(), begun);
+    let earlier = if is_earlier { "an earlier build of " } else { "" };
+    is_other.then(|| {
+        Failure::usage(format!(
+            "the {what} in `{shown}` was begun by {earlier}avastra {avastra} in world `{engine}`, this is avastra {VERSION} in \
+             `{ENGINE}`: begin a new one"
+        ))
+    })
 }
 
 /// What a directory holds, if anything.

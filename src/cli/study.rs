@@ -256,7 +256,7 @@ pub fn read_sound(directory: &Path) -> Result<Sound, Failure> {
         )));
     }
     let text = load::text(&path)?;
-    let settings: StudySettings = load::parsed(&path, &text)?;
+    let settings: StudySettings = run_directory::settings_in(directory, &text)?;
     let unread = |error| Failure::file("read", &file, error);
     let (database, changed) = run_directory::open_to_read::<StudyDatabase>(&file, &text)?;
     let missing = missing(directory, &settings, &database, |_| true)?;

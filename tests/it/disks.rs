@@ -135,6 +135,25 @@ fn what_a_kill_left_before_the_beginning_can_be_begun() {
 }
 
 #[test]
+fn a_directory_whose_conditions_stand_at_the_top_was_begun_by_an_earlier_build() {
+    let scratch = Scratch::new();
+    let out = scratch.text("run");
+    assert_eq!(run_into(&out).0, 0);
+    let settings = scratch.path("run/run.yaml");
+    let text = std::fs::read_to_string(&settings).expect("it is written");
+    let mut is_inside = false;
+    let flat = text.lines().filter_map(|line| {
+        is_inside = line == "conditions:" || is_inside && line.starts_with(' ');
+        (line != "conditions:")
+            .then(|| line.strip_prefix("  ").filter(|_| is_inside).unwrap_or(line).to_owned() + "\n")
+    });
+    let flat: String = flat.collect();
+    assert!(flat.contains("\nengine: ") || flat.starts_with("avastra: "), "{flat}");
+    std::fs::write(&settings, flat).expect("it is writable");
+    fails(&["run", "--resume", &out], "was begun by an earlier build of avastra");
+}
+
+#[test]
 fn a_run_that_was_edited_is_not_gone_on_with() {
     let scratch = Scratch::new();
     let out = scratch.text("run");

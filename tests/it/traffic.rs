@@ -104,7 +104,7 @@ fn a_run_says_how_many_ambient_vehicles_there_are() {
     let many = told("100");
     let line =
         many.lines().find(|line| line.starts_with("of 100 vehicles of ambient traffic")).expect("it is told");
-    let (_, found) = line.split_once("at the start there are ").expect("it counts them");
+    let (_, found) = line.split_once("at the start of its first episode there are ").expect("it counts them");
     let found: u32 = found.split(' ').next().and_then(|text| text.parse().ok()).expect("a number");
     assert!((10..100).contains(&found), "{line}");
     assert!(!told("0").contains("ambient traffic"), "none are asked for");
