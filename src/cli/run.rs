@@ -375,47 +375,42 @@ fn keep_near(run: &Run, directory: &Directory) -> Result<Vec<PathBuf>, Failure> 
 
 /// Says of a policy that plays where, or against whom, it has not learned, how it was trained.
 fn trained_elsewhere(policy: &Policy, run: &Run) -> Option<String> {
-    let (origin, settings) = (&policy.origin, run.settings());
+    let (origin, now) = (&policy.origin, &run.settings().conditions);
     let mut told = Vec::new();
-    let roads: Vec<&str> = settings
-        .conditions
-        .roads
-        .iter()
-        .filter(|road| !origin.roads.contains(road))
-        .map(String::as_str)
-        .collect();
+    let roads: Vec<&str> =
+        now.roads.iter().filter(|road| !origin.roads.contains(road)).map(String::as_str).collect();
     if !roads.is_empty() {
         told.push(format!("on {}, and plays on {}", origin.roads.join(", "), roads.join(", ")));
     }
     // A profile that is not recorded is the default.
     let usual = || (origin.ads == DEFAULT_ADS).then(|| ModularConfig::default().digest());
     let trained = origin.profile_digest.clone().or_else(usual);
-    let profile = settings.conditions.profile.as_ref().map(|profile| profile.digest.clone());
-    let now = run.arena().attached().map(|attached| attached.digest()).or(profile).or_else(usual);
-    if settings.conditions.ads != origin.ads {
+    let profile = now.profile.as_ref().map(|profile| profile.digest.clone());
+    let plays = run.arena().attached().map(|attached| attached.digest()).or(profile).or_else(usual);
+    if now.ads != origin.ads {
         told.push(format!("against {}, and plays against {}", origin.ads, run.arena().ads_name()));
-    } else if trained != now {
+    } else if trained != plays {
         let how =
             |line: Option<&str>| line.map_or("its default profile".to_owned(), |line| format!("`{line}`"));
-        let line = settings.conditions.profile.as_ref().map(|profile| profile.settings.to_line());
+        let line = now.profile.as_ref().map(|profile| profile.settings.to_line());
         let line =
             line.filter(|line| !line.is_empty()).or_else(|| run.arena().attached().map(|of| of.to_line()));
         let (before, after) = (how(origin.profile.as_deref()), how(line.as_deref()));
         told.push(format!("against {} with {before}, and plays against it with {after}", origin.ads));
     }
-    let traffic = settings.conditions.traffic.as_ref().map(TrafficRecord::in_words);
+    let traffic = now.traffic.as_ref().map(TrafficRecord::in_words);
     if traffic != origin.traffic {
         let usual = || "the usual".to_owned();
         let (before, after) = (origin.traffic.clone().unwrap_or_else(usual), traffic.unwrap_or_else(usual));
         told.push(format!("with traffic {before}, and plays with {after}"));
     }
-    if settings.conditions.ambient > 0 {
-        let vehicles = plural(settings.conditions.ambient as usize, "vehicle");
+    if now.ambient > 0 {
+        let vehicles = plural(now.ambient as usize, "vehicle");
         told.push(format!("without ambient traffic, and plays among {vehicles} of it"));
     }
     for (how, none, before, now) in [
-        ("with", "with no optional rule", &origin.with, &settings.conditions.with),
-        ("without", "with every standard rule", &origin.without, &settings.conditions.without),
+        ("with", "with no optional rule", &origin.with, &now.with),
+        ("without", "with every standard rule", &origin.without, &now.without),
     ] {
         if before != now {
             let rules = |names: &[String]| match names {
@@ -432,24 +427,21 @@ fn trained_elsewhere(policy: &Policy, run: &Run) -> Option<String> {
 
 fn heading(run: &Run) -> String {
     let settings = run.settings();
-    let ambient = match settings.conditions.ambient {
+    let Conditions { roads, profile, ambient, traffic, .. } = &settings.conditions;
+    let ambient = match *ambient {
         0 => String::new(),
         wanted => format!(", {} of ambient traffic", plural(wanted as usize, "vehicle")),
     };
-    let traffic = settings
-        .conditions
-        .traffic
-        .as_ref()
-        .map_or(String::new(), |record| format!(", traffic {}", record.in_words()));
+    let traffic = traffic.as_ref().map_or(String::new(), |record| format!(", traffic {}", record.in_words()));
     let ads = run.arena().ads_name();
     format!(
         "{}: {} against {}{}, {} on {}{ambient}{traffic}, seed {}",
         run.space().path.shown(),
         settings.agent,
         ads,
-        profile_text(settings.conditions.profile.as_ref()),
+        profile_text(profile.as_ref()),
         plural(if settings.rows > 0 { run.episodes() } else { settings.episodes as usize }, "episode"),
-        settings.conditions.roads.join(", "),
+        roads.join(", "),
         settings.seed
     )
 }

@@ -17,7 +17,7 @@ use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::files::{self, Lock};
 use avastra_campaign::oracle::Found;
 use avastra_campaign::run::{
-    Conditions, DatabaseError, EpisodeSummary, Near, Numbered, Shard, Units, VERSION, WrittenScenario,
+    self, Conditions, DatabaseError, EpisodeSummary, Near, Numbered, Shard, Units, VERSION, WrittenScenario,
 };
 use avastra_drivers::external::{Attached, ExternalSettings};
 use avastra_lang::check::normal;
@@ -118,20 +118,10 @@ pub struct Begun {
     space_digest: Option<String>,
 }
 
-/// Settings of this version or of an earlier one, which had no `conditions`.
-#[derive(serde::Deserialize)]
-#[serde(untagged)]
-enum Written {
-    Now { conditions: Begun },
-    Before(Begun),
-}
-
-/// What settings begin with, of any kind and version, and whether they have no `conditions` yet.
+/// What settings begin with, of any kind and version, and whether they are of an earlier build, which had no `conditions`.
 pub fn begun_in(text: &str) -> Option<(Begun, bool)> {
-    match serde_yaml::from_str(text).ok()? {
-        Written::Now { conditions } => Some((conditions, false)),
-        Written::Before(begun) => Some((begun, true)),
-    }
+    let (fields, has_conditions) = run::flat(text)?;
+    Some((serde_json::from_value(fields.into()).ok()?, !has_conditions))
 }
 
 /// A directory that is gone on with.

@@ -37,6 +37,7 @@ impl Beside {
         if self.offset_m.abs() - across_m >= half_way_m {
             return None;
         }
+        // All of the box is in the strip.
         if self.offset_m.abs() + across_m <= half_way_m {
             let along_m = (cosine.abs() * length_m + sine.abs() * width_m) / 2.0;
             return Some(Span { from_m: self.station_m - along_m, to_m: self.station_m + along_m });

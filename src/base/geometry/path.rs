@@ -321,6 +321,11 @@ impl Path {
     /// straight.
     pub fn along(&self, station_m: f64) -> (Vec2, Vec2) {
         let (index, fraction) = self.locate(station_m);
+        self.along_segment(index, fraction)
+    }
+
+    /// As [`Path::along`], at a fraction of a segment.
+    fn along_segment(&self, index: usize, fraction: f64) -> (Vec2, Vec2) {
         let (a, b) = (&self.points[index], &self.points[index + 1]);
         let forward = if a.heading_rad == b.heading_rad {
             self.forwards[index]
@@ -388,18 +393,14 @@ impl Path {
         let mut station_m = guess_m;
         for _ in 0..5 {
             let (index, fraction) = self.locate(station_m);
-            let (a, b) = (&self.points[index], &self.points[index + 1]);
-            let forward = match a.heading_rad == b.heading_rad {
-                true => self.forwards[index],
-                false => unit_vector(heading_between(a, b, fraction)),
-            };
-            let away = point - (a.position + (b.position - a.position) * fraction);
+            let (position, forward) = self.along_segment(index, fraction);
+            let away = point - position;
             let ahead_m = forward.dot(&away);
             station_m += ahead_m;
             // On a straight segment one step leads there.
             let stays = self.straights[index]
-                && (station_m >= a.station_m || index == 0)
-                && (station_m <= b.station_m || index + 2 == self.points.len());
+                && (station_m >= self.points[index].station_m || index == 0)
+                && (station_m <= self.points[index + 1].station_m || index + 2 == self.points.len());
             if stays || ahead_m.abs() < 0.02 {
                 return Some(Beside { station_m, offset_m: forward.perp(&away), forward });
             }

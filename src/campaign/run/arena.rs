@@ -19,7 +19,8 @@ use avastra_search::mdp::ProcKind;
 use avastra_world::action::{ActionTable, Draw, Offer};
 use avastra_world::sim::{Scene, Start, TrafficProfile};
 
-use crate::run::settings::RunError;
+use crate::run::profile::{traffic_of, under_test};
+use crate::run::settings::{Conditions, RunError};
 
 /// Everything that the episodes of a run or a training share.
 pub struct Arena {
@@ -61,6 +62,17 @@ impl Arena {
             }
         }
         Ok(Arena { table, rules: Arc::new(rules), ads, traffic: TrafficProfile::default(), roads })
+    }
+
+    /// The arena of some conditions, with the driving system and the traffic that they record.
+    ///
+    /// # Errors
+    /// As [`Arena::new`], and if the driving system or the traffic cannot be had as recorded.
+    pub(crate) fn under(table: ActionTable, conditions: &Conditions) -> Result<Arena, RunError> {
+        let Conditions { roads, ads, profile, external, traffic, with, without, .. } = conditions;
+        let ads = under_test(ads, profile.as_ref(), external.as_ref())?;
+        let traffic = traffic_of(traffic.as_ref())?;
+        Ok(Arena::new(table, roads, ads, with, without)?.with_traffic(traffic))
     }
 
     /// The same arena, in which other vehicles drive by another profile.

@@ -42,12 +42,11 @@ pub use profile::{
     Asked, DEFAULT_ADS, Profile, TrafficRecord, driving_system, found_with, recorded, recorded_traffic,
     started, trained_against,
 };
-pub(crate) use profile::{traffic_of, under_test};
 pub use protocol::{Ending, HeatMap, ProtocolTest, Tally, heat_maps, main_maps, parameters};
 pub use sealed::differences as settings_differences;
 pub use sealed::{DatabaseError, Layout};
 pub(crate) use sealed::{insert_row, of_columns, query_all, settings_digest};
-pub use settings::{Conditions, EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};
+pub use settings::{Conditions, EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION, flat};
 pub(crate) use settings::{agent_named, check_episodes};
 pub use settled::{Numbered, Units, WrittenScenario};
 pub use shard::{SHARDS_MAX, Shard};

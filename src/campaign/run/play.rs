@@ -20,7 +20,6 @@ use avastra_world::sim::World;
 use crate::run::arena::{Arena, Offers, choose};
 use crate::run::gauges::Gauges;
 use crate::run::offered::Offered;
-use crate::run::profile::{traffic_of, under_test};
 use crate::run::settings::{RunError, RunSettings, agent_named, check_episodes};
 use crate::run::summary::EpisodeSummary;
 use crate::run::threads::on_threads;
@@ -74,22 +73,8 @@ impl Run {
         if settings.avoidability != AvoidabilitySettings::default() {
             return Err(RunError::Avoidability);
         }
-        let ads = under_test(
-            &settings.conditions.ads,
-            settings.conditions.profile.as_ref(),
-            settings.conditions.external.as_ref(),
-        )?;
-        let has_modules = ads.profile().is_some();
-        let traffic = traffic_of(settings.conditions.traffic.as_ref())?;
-        let arena = Arena::new(
-            table,
-            &settings.conditions.roads,
-            ads,
-            &settings.conditions.with,
-            &settings.conditions.without,
-        )?
-        .with_traffic(traffic);
-        if settings.causes && !has_modules {
+        let arena = Arena::under(table, &settings.conditions)?;
+        if settings.causes && arena.ads().profile().is_none() {
             return Err(RunError::NoModules(oracle::NoModules { ads: arena.ads_name() }));
         }
         Ok(Run { arena, settings, agent, plan: Vec::new() })

@@ -68,7 +68,7 @@ impl TrafficRecord {
 ///
 /// # Errors
 /// If its settings mean something else in this version.
-pub(crate) fn traffic_of(record: Option<&TrafficRecord>) -> Result<TrafficProfile, RunError> {
+pub(super) fn traffic_of(record: Option<&TrafficRecord>) -> Result<TrafficProfile, RunError> {
     match record {
         None => Ok(TrafficProfile::default()),
         Some(record) if record.settings.digest() != record.digest => {
@@ -103,7 +103,7 @@ pub fn recorded_traffic(scenario: &Scenario) -> Result<TrafficProfile, RunError>
 /// # Errors
 /// If there is none of that name, it has no settings, or they mean something else in this version; if an external one
 /// cannot be started, or has another name, version or kind of answer.
-pub(crate) fn under_test(
+pub(super) fn under_test(
     ads: &str,
     profile: Option<&Profile>,
     external: Option<&Attached>,

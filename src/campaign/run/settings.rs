@@ -68,6 +68,17 @@ impl Conditions {
     }
 }
 
+/// The fields of settings in which nothing is nested: those under `conditions` stand beside the others, as in settings of earlier
+/// builds; and whether there are `conditions`. `None` if the text is no settings.
+pub fn flat(settings: &str) -> Option<(serde_json::Map<String, serde_json::Value>, bool)> {
+    let mut fields: serde_json::Map<String, serde_json::Value> = serde_yaml::from_str(settings).ok()?;
+    let Some(serde_json::Value::Object(conditions)) = fields.remove("conditions") else {
+        return Some((fields, false));
+    };
+    fields.extend(conditions);
+    Some((fields, true))
+}
+
 /// Everything that is needed to repeat a run; written to `run.yaml`.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]

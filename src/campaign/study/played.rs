@@ -6,9 +6,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::run::Conditions;
 use crate::study::measures::{MEASURES, MeasuredCell};
 use crate::study::record::CellRecord;
 use crate::study::settings::{AgentSettings, StudySettings};
+use avastra_drivers::external::Attached;
 use avastra_lang::model::digest;
 use avastra_search::agent::by_name;
 
@@ -189,15 +191,10 @@ impl Played {
         if !missing.is_empty() {
             found.push(format!("without {}", missing.join(", ")));
         }
-        let roads: Vec<&str> = wanted
-            .conditions
-            .roads
-            .iter()
-            .filter(|road| self.settings.conditions.roads.contains(road))
-            .map(String::as_str)
-            .collect();
-        if roads.len() < wanted.conditions.roads.len() {
-            found.push(format!("on {} of {} roads", roads.len(), wanted.conditions.roads.len()));
+        let (own, all) = (&self.settings.conditions.roads, &wanted.conditions.roads);
+        let roads: Vec<&str> = all.iter().filter(|road| own.contains(road)).map(String::as_str).collect();
+        if roads.len() < all.len() {
+            found.push(format!("on {} of {} roads", roads.len(), all.len()));
         }
         // What agents have in common is said once.
         let mut alike: BTreeMap<String, Vec<&str>> = BTreeMap::new();
@@ -237,27 +234,13 @@ impl Played {
                 found.push(what.to_owned());
             }
         };
-        differs(
-            own.conditions.engine != wanted.conditions.engine,
-            &format!("the world is `{}` by now", wanted.conditions.engine),
-        );
-        differs(
-            own.conditions.space_digest != wanted.conditions.space_digest,
-            "the space means something else by now",
-        );
-        let ads = |settings: &StudySettings| {
-            (
-                settings.conditions.ads.clone(),
-                settings.conditions.profile.clone(),
-                settings.conditions.external.as_ref().map(|one| one.name()),
-            )
-        };
-        differs(ads(own) != ads(wanted), "played against another driving system or profile");
-        differs(
-            (own.conditions.ambient, &own.conditions.traffic)
-                != (wanted.conditions.ambient, &wanted.conditions.traffic),
-            "played in other traffic",
-        );
+        let (was, is) = (&own.conditions, &wanted.conditions);
+        differs(was.engine != is.engine, &format!("the world is `{}` by now", is.engine));
+        differs(was.space_digest != is.space_digest, "the space means something else by now");
+        let ads =
+            |of: &Conditions| (of.ads.clone(), of.profile.clone(), of.external.as_ref().map(Attached::name));
+        differs(ads(was) != ads(is), "played against another driving system or profile");
+        differs((was.ambient, &was.traffic) != (is.ambient, &is.traffic), "played in other traffic");
         differs(own.first_seed != wanted.first_seed, "played from another first seed");
         differs(own.avoidability != wanted.avoidability, "verdicts have other settings by now");
         let (mine, theirs) = (&own.evaluation, &wanted.evaluation);

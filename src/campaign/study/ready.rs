@@ -53,11 +53,8 @@ impl Study {
 
     /// The driving system under test: its name here, or what an external one calls itself.
     pub fn ads_name(&self) -> String {
-        self.settings
-            .conditions
-            .external
-            .as_ref()
-            .map_or_else(|| self.settings.conditions.ads.clone(), Attached::name)
+        let Conditions { ads, external, .. } = &self.settings.conditions;
+        external.as_ref().map_or_else(|| ads.clone(), Attached::name)
     }
 
     pub(super) fn agent(&self, job: &Job) -> &AgentSettings {

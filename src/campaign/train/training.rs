@@ -10,7 +10,6 @@ use crate::episode;
 use crate::episode::{Choice, End, EpisodeLog, Moment, Play, Script, Setup};
 use crate::run::{
     Arena, Conditions, EpisodeSummary, Finding, RunError, agent_named, check_episodes, choose, legal,
-    traffic_of, under_test,
 };
 use avastra_base::rng;
 use avastra_base::rng::Stream;
@@ -245,19 +244,7 @@ fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<
     }
     let table = with_period(table, settings.hyperparameters.observation_period_s());
     let rows = Arc::new(Rows::new(&table, settings.hyperparameters.actions())?);
-    let ads = under_test(
-        &settings.conditions.ads,
-        settings.conditions.profile.as_ref(),
-        settings.conditions.external.as_ref(),
-    )?;
-    let arena = Arena::new(
-        table,
-        &settings.conditions.roads,
-        ads,
-        &settings.conditions.with,
-        &settings.conditions.without,
-    )?;
-    Ok((arena.with_traffic(traffic_of(settings.conditions.traffic.as_ref())?), rows))
+    Ok((Arena::under(table, &settings.conditions)?, rows))
 }
 
 /// The table with another observation period.

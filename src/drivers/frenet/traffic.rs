@@ -71,11 +71,7 @@ impl Other {
             let (pose, next) = (poses[step / STRIDE], poses[step / STRIDE + 1]);
             let gone = next.position - pose.position;
             let part = (step % STRIDE) as f64 / STRIDE as f64;
-            let beside = if step == 0 {
-                tracer.here().or_else(|| tracer.behind())
-            } else {
-                tracer.next(pose.position + gone * part)
-            };
+            let beside = if step == 0 { tracer.first() } else { tracer.next(pose.position + gone * part) };
             *place = beside
                 .filter(|beside| beside.offset_m.abs() < reach_m)
                 .map(|beside| Place::of(&beside, &pose, gone / STRIDE_S, object));

@@ -31,9 +31,6 @@ const POSITION_ERROR_M: f64 = 2.0;
 /// Most steps along tangents until a place has settled; in a bend each step leaves a fraction of the error.
 const SLIDES_MAX: usize = 8;
 
-/// Rounds to the nearest integer: adding it makes a number above -1024 positive before its fraction is cut off.
-const HALF_UP: f64 = 1024.5;
-
 /// Samples whose headings and places differ by less from those on a line belong to one straight piece, rad and m.
 const STRAIGHT_RAD: f64 = 1e-5;
 const STRAIGHT_M: f64 = 1e-3;
@@ -92,16 +89,15 @@ struct Sample {
     speed_mps_max: f64,
     /// The first and the last sample of the straight piece that it belongs to; both itself in a bend.
     straight: [u32; 2],
-    /// How far the guide has turned from its start to here, to either side, rad.
-    turned_rad: f64,
 }
 
-/// Notes where the guide is straight, and how far it turns.
-fn note_turns(samples: &mut [Sample]) {
-    for index in 1..samples.len() {
-        let turn_rad = wrap_angle(samples[index].heading_rad - samples[index - 1].heading_rad).abs();
-        samples[index].turned_rad = samples[index - 1].turned_rad + turn_rad;
-    }
+/// The nearest integer to a number above -1024: `f64::round` is a call where the processor need not have it.
+fn rounded(number: f64) -> isize {
+    (number + 1024.5) as i32 as isize - 1024
+}
+
+/// Notes where the guide is straight.
+fn note_straights(samples: &mut [Sample]) {
     let mut first = 0;
     while first < samples.len() {
         let Sample { position, forward, .. } = samples[first];
@@ -162,7 +158,6 @@ impl Guide {
                     curvature_per_m,
                     speed_mps_max: limit_mps.min(rules.cruise_mps).min(curve_mps),
                     straight: [0, 0],
-                    turned_rad: 0.0,
                 }
             })
             .collect();
@@ -176,7 +171,7 @@ impl Guide {
     }
 
     fn of_samples(mut samples: Vec<Sample>, range_m: f64, is_motorway: bool) -> Guide {
-        note_turns(&mut samples);
+        note_straights(&mut samples);
         let spacings_m = samples.windows(2).map(|pair| (pair[1].position - pair[0].position).norm());
         Guide { spacing_m_max: spacings_m.fold(0.0, f64::max), samples, range_m, is_motorway }
     }
@@ -216,7 +211,6 @@ impl Guide {
                 curvature_per_m: wrap_angle(after.heading_rad - before.heading_rad) / way_m,
                 speed_mps_max: f64::INFINITY,
                 straight: [0, 0],
-                turned_rad: 0.0,
             }
         };
         let samples = (0..count).map(sample).collect();
@@ -291,8 +285,8 @@ impl Guide {
         let within = self.stretch(from_m, to_m);
         let reach_m = reach_m + SPACING_M;
         let nearest = self.nearest_within(point, within, reach_m);
-        let turns_rad = self.samples[within.last].turned_rad - self.samples[within.first].turned_rad;
-        Tracer { guide: self, within, reach_m, is_straight: turns_rad < STRAIGHT_RAD, point, nearest }
+        let is_straight = within.last <= self.samples[within.first].straight[1] as usize;
+        Tracer { guide: self, within, reach_m, is_straight, point, nearest }
     }
 
     fn beside_sample(&self, point: Vec2, index: usize) -> Beside {
@@ -361,7 +355,7 @@ impl Guide {
             let Sample { position, forward, straight, .. } = self.samples[index];
             let ahead_m = forward.dot(&(point - position));
             // On a straight piece the nearest sample needs no search.
-            let nearest = index.saturating_add_signed((ahead_m / SPACING_M + HALF_UP) as i32 as isize - 1024);
+            let nearest = index.saturating_add_signed(rounded(ahead_m / SPACING_M));
             let is_inside = straight[0] as usize <= nearest && nearest <= straight[1] as usize;
             let is_on_it = straight[0] < straight[1] && is_inside;
             if is_on_it && within.first <= nearest && nearest <= within.last {
@@ -443,14 +437,19 @@ pub struct Tracer<'a> {
 }
 
 impl Tracer<'_> {
+    /// The projection of the first position; `None` if it is out of reach of the stretch and of the line that leads to its start.
+    pub fn first(&self) -> Option<Beside> {
+        self.here().or_else(|| self.behind())
+    }
+
     /// The projection of the last position; `None` if it is out of reach.
-    pub fn here(&self) -> Option<Beside> {
+    fn here(&self) -> Option<Beside> {
         let nearest = self.nearest.ok().filter(|nearest| self.is_near(nearest))?;
         Some(self.guide.beside_sample(self.point, nearest.index))
     }
 
     /// The projection of the last position if it lies behind the stretch, in reach of the line that leads to its start.
-    pub fn behind(&self) -> Option<Beside> {
+    fn behind(&self) -> Option<Beside> {
         let beside = self.guide.beside_sample(self.point, self.within.first);
         let is_behind = beside.station_m < self.within.first as f64 * SPACING_M;
         (is_behind && beside.offset_m.abs() <= self.reach_m).then_some(beside)

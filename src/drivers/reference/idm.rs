@@ -205,8 +205,7 @@ impl Idm {
         let (position, from_m) = (object.pose.position, rear_m - behind_m);
         let to_m = front_m + self.scene.range_m;
         let mut tracer = self.guide().trace(position, from_m, to_m, reach_m);
-        let now = tracer.here().or_else(|| tracer.behind());
-        if let Some((beside, span)) = now.and_then(|beside| Some((beside, taken(&beside)?))) {
+        if let Some((beside, span)) = tracer.first().and_then(|beside| Some((beside, taken(&beside)?))) {
             // On a motorway a vehicle behind keeps its distance, also on the way into the lane. Once its middle is behind the
             // front, the ego vehicle is past it.
             let follows = self.scene.is_motorway && beside.station_m < rear_m;

@@ -4,7 +4,9 @@ use serde_json::{Value, json};
 
 use avastra_campaign::estimate::FRAME;
 use avastra_campaign::oracle::MIXED;
-use avastra_campaign::run::{Database, DatabaseError, HeatMap, Profile, RequirementCount, TrafficRecord};
+use avastra_campaign::run::{
+    self, Database, DatabaseError, HeatMap, Profile, RequirementCount, TrafficRecord,
+};
 use avastra_drivers::external::Attached;
 use avastra_world::action::ActionTable;
 
@@ -85,13 +87,9 @@ struct Told {
     first_seed: Option<u64>,
 }
 
-/// Reads settings of earlier versions, too, in which nothing stood under `conditions`.
+/// Reads settings of earlier builds, too.
 fn told_in(settings: &str) -> Option<Told> {
-    let mut fields: serde_json::Map<String, Value> = serde_yaml::from_str(settings).ok()?;
-    if let Some(Value::Object(conditions)) = fields.remove("conditions") {
-        fields.extend(conditions);
-    }
-    serde_json::from_value(Value::Object(fields)).ok()
+    serde_json::from_value(Value::Object(run::flat(settings)?.0)).ok()
 }
 
 /// The traffic profile of runs that ask for none.

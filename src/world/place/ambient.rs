@@ -15,7 +15,6 @@ use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::body;
 use avastra_lang::model::command::IgnoredRules;
 use avastra_lang::model::vocabulary::{Body, BodyClass, Colour, Verb, Word};
-
 use avastra_road::is_apart;
 
 use crate::scene::lanes::may_use;
@@ -86,6 +85,7 @@ fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<RoadU
     let here = centre.position_at(station_m);
     let away = here - around.ego_outline.pose.position;
     let height_m = around.scene.map.lane(lane).height_at(station_m);
+    // Asked before its way is laid, which takes longer. `has_room` then asks for the gap.
     let is_taken = |other: &Obstacle| {
         let away = other.outline.pose.position - here;
         away.norm_squared() < ROOM_M * ROOM_M && !is_apart(height_m, other.elevation_m)

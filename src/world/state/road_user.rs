@@ -161,7 +161,7 @@ impl Mover {
 /// The road users near this one when it last looked. Until the ways driven since exceed `gap_m`, it can touch no other.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Room {
-    /// One bit for each of the first 64 road users, by index: who was near.
+    /// One bit for each of the first [`Room::LISTED`] road users, by index: who was near.
     pub near: u64,
     /// Least gap between circles around it and around one that was not near, m.
     pub gap_m: f64,
@@ -170,6 +170,11 @@ pub struct Room {
     /// How many road users there were, and the ids of the next newcomers, by an action and in ambient traffic: nobody has come or
     /// gone while all three are the same.
     pub among: (usize, u32, u32),
+}
+
+impl Room {
+    /// How many road users have a bit.
+    pub const LISTED: usize = u64::BITS as usize;
 }
 
 /// How far any road user can have come at most.

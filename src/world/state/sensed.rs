@@ -3,8 +3,6 @@
 use avastra_base::geometry::{Pose, Vec2};
 use avastra_lang::model::vocabulary::{Body, ShownLights};
 
-use crate::state::trace::traced;
-
 /// What the sensors give in one tick.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensed {
@@ -101,5 +99,3 @@ impl SignalColour {
         }
     }
 }
-
-traced!(enum SignalColour);

@@ -73,7 +73,7 @@ pub trait Traced {
 ///
 /// - It feeds the fields in this order; what stands after `=>` in place of a field.
 /// - It leaves out the fields after `but`. A field in neither list does not compile.
-/// - `traced!(enum A, B)` is for enums without data.
+/// - `traced!(enum A, B)` is for enums without data, and for what else becomes a word by itself.
 macro_rules! traced {
     (@ $trace:ident, $field:ident) => { $crate::state::trace::Traced::trace($field, $trace) };
     (@ $trace:ident, $field:ident, $word:expr) => { $crate::state::trace::Traced::trace(&$word, $trace) };
@@ -96,7 +96,8 @@ macro_rules! traced {
 }
 pub(crate) use traced;
 
-traced!(enum bool, u8, u32, u64, usize, Body, Colour, LaneChoice, Level, LightColour, Priority, ShownLights, Side, TimeOfDay, Turning, Verb);
+traced!(enum bool, u8, u32, u64, usize);
+traced!(enum Body, Colour, LaneChoice, Level, LightColour, Priority, ShownLights, Side, TimeOfDay, Turning, Verb);
 
 traced! {
     Pose { position, heading_rad };

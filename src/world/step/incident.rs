@@ -11,7 +11,7 @@ use avastra_base::geometry::{FirstContact, Frame, Pose, Sweep, Vec2, first_conta
 use avastra_road::is_apart;
 
 use crate::state::contact::Incident;
-use crate::state::road_user::RoadUser;
+use crate::state::road_user::{RoadUser, Room};
 use crate::state::time::DT_S;
 
 /// Obstacles whose gap after a tick is at least this are not checked for contact, m: far more than
@@ -31,7 +31,7 @@ pub struct Bump {
 }
 
 /// The first obstacle in the way when the obstacle at `index` moves to `end`, in the tick after `tick`. It looks at the road users
-/// whose bit is set in `near`, and at all from index 64 on.
+/// whose bit is set in `near`, and at all that have none.
 pub fn bump(users: &[RoadUser], index: usize, near: u64, end: &Pose, tick: u64) -> Option<Bump> {
     let this = &users[index].obstacle;
     let outline = &this.outline;
@@ -46,13 +46,13 @@ pub fn bump(users: &[RoadUser], index: usize, near: u64, end: &Pose, tick: u64) 
     let most_m = way.norm() + turn_rad.abs() * radius_m;
     let reach_m = radius_m + most_m;
     let mut first: Option<(usize, FirstContact)> = None;
-    let mut rest = near & !(1_u64.checked_shl(index as u32).unwrap_or(0));
+    let mut rest = near;
     let listed = core::iter::from_fn(|| {
         let other = rest.trailing_zeros() as usize;
         rest &= rest.wrapping_sub(1);
-        (other < users.len().min(64)).then_some(other)
+        (other < users.len().min(Room::LISTED)).then_some(other)
     });
-    for other in listed.chain(64..users.len()) {
+    for other in listed.chain(Room::LISTED..users.len()) {
         let RoadUser { obstacle, .. } = &users[other];
         let near_m = reach_m + obstacle.outline.half_length_m + obstacle.outline.half_width_m;
         let away = obstacle.outline.pose.position - outline.pose.position;

@@ -256,7 +256,7 @@ impl World {
         true
     }
 
-    /// The road users that the one at `index` may touch on its way to `end`: one bit for each of the first 64.
+    /// The road users that the one at `index` may touch on its way to `end`: one bit for each of the first [`Room::LISTED`].
     /// A pair that was far apart is checked again only when both could have closed the gap.
     fn near(&self, users: &mut [RoadUser], index: usize, end: &Pose) -> u64 {
         let Travel { done_m, now_m } = self.travel;
@@ -269,7 +269,7 @@ impl World {
         }
         let circle_m = |outline: &OrientedBox| outline.half_length_m + outline.half_width_m;
         let mut room = Room { near: 0, gap_m: f64::INFINITY, since_m: done_m, among };
-        for (other, RoadUser { obstacle, .. }) in users.iter().enumerate().take(64) {
+        for (other, RoadUser { obstacle, .. }) in users.iter().enumerate().take(Room::LISTED) {
             let away = obstacle.outline.pose.position - outline.pose.position;
             let gap_m = away.norm() - circle_m(&obstacle.outline) - circle_m(&outline);
             if gap_m < NEARBY_M {

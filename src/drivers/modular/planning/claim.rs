@@ -91,8 +91,7 @@ impl Claim {
             if step > 0 {
                 forward = direction(position - forecast.positions[step - 1], forward);
             }
-            let on_guide =
-                if step == 0 { tracer.here().or_else(|| tracer.behind()) } else { tracer.next(position) };
+            let on_guide = if step == 0 { tracer.first() } else { tracer.next(position) };
             let taken = on_guide.and_then(|on_guide| {
                 let offset_m = on_guide.offset_m - lateral.aside(on_guide.station_m).offset_m;
                 let beside = Beside { offset_m, ..on_guide };

@@ -277,7 +277,7 @@ impl<'a> Walk<'a> {
     }
 
     /// The segment at the place `ahead_m` ahead of the vehicle, and how far beyond its first vertex that
-    /// is, m. Beyond the end of the course it is on the tangent. Places must not go back.
+    /// is, m. Beyond the end of the course it is on the tangent. Places must not go back to an earlier lane.
     pub fn to(&mut self, map: &'a RoadMap, course: &Course, ahead_m: f64) -> (Segment<'a>, f64) {
         let station_m = course.station_m + ahead_m;
         if let Some(segment) = &self.segment

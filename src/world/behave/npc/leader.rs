@@ -37,15 +37,15 @@ impl Driver {
         let mut nearest: Option<Leader> = None;
         // The gap that it keeps to somebody is not that of following.
         let kept = self.kept(around).map(|(kept, _)| kept.outline);
-        self.minded(around).for_each(|other| {
+        for other in self.minded(around) {
             let outline = other.outline;
             if kept.is_some_and(|kept| core::ptr::eq(kept, outline)) {
-                return;
+                continue;
             }
             let delta = outline.pose.position - here.position;
             let reach_m = reach_m + outline.half_length_m;
             if delta.norm_squared() > reach_m * reach_m || forward.dot(&delta) < 0.0 {
-                return;
+                continue;
             }
             let on_own_way = self
                 .in_corridor((&self.way, self.station_m, None), here, size, other)
@@ -58,7 +58,7 @@ impl Driver {
                     nearest = Some(leader);
                 }
             }
-        });
+        }
         nearest
     }
 
