@@ -34,8 +34,7 @@ use avastra::check::ReadError;
 use avastra::editor::{Files, Workspace, diagnostics};
 use avastra::mdp::ProcKind;
 use avastra::model::Space;
-use avastra::model::command::IgnoredRules;
-use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, ShownLights, Side, Then, TimeOfDay, Verb};
+use avastra::model::vocabulary::{LaneChoice, Level, Side, TimeOfDay, Verb};
 use avastra::run::{Arena, Conditions, Run, RunSettings};
 use avastra::sim::{Scene, Sensed, Start, TrafficProfile, World};
 use avastra::{ads, episode};
@@ -123,31 +122,9 @@ fn crowded(scene: &Arc<Scene>) -> World {
                 if world.obstacles().len() == 10 {
                     return world;
                 }
-                let request = SpawnRequest {
-                    body: if verb == Verb::Walk { Body::Pedestrian } else { Body::Sedan },
-                    colour: Colour::Red,
-                    verb,
-                    lane,
-                    side: Side::Left,
-                    then: Then::Keep,
-                    speed_mps: if verb == Verb::Walk { 1.2 } else { 9.0 },
-                    distance_m,
-                    cover: None,
-                    offset_m: 0.0,
-                    ignores: IgnoredRules::default(),
-                    meet: None,
-                    waits_s: None,
-                    early_s: None,
-                    behind_first_m: 0.0,
-                    first_m: None,
-                    siren: false,
-                    turn: None,
-                    lights: ShownLights::Off,
-                    trajectory: None,
-                    bearer: None,
-                    own: None,
-                    cover_own: None,
-                };
+                let speed_mps = if verb == Verb::Walk { 1.2 } else { 9.0 };
+                let asked = SpawnRequest::new(verb, distance_m, speed_mps);
+                let request = SpawnRequest { lane, side: Side::Left, ..asked };
                 // A place that is taken does not matter: there are more places than needed.
                 let _ = world.apply(&Effect::Spawn(request));
             }

@@ -5,9 +5,9 @@ use avastra_base::units::Dimension;
 use avastra_lang::check::{Declaration, References, Symbol};
 use avastra_lang::model::Type;
 use avastra_lang::model::vocabulary::{
-    BREACHED, BodyClass, CHANGE, CommandField, EpisodeField, Fact, KEPT, Known, LIGHT, LightField, MARGIN,
-    PointField, RECURRENCE, ROAD_USER, RoadField, SINCE, ScenarioClaim, Site, SpaceClaim, SpawnField,
-    StartField, StopReason, THERE, TrajectoryField, WAIT, Word, parts_of, parts_of_named, things,
+    BREACHED, BodyClass, CHANGE, EpisodeField, Fact, Field as Told, KEPT, Known, LIGHT, LightField, MARGIN,
+    PointField, RECURRENCE, ROAD_USER, RoadField, SINCE, ScenarioClaim, Site, SpaceClaim, StartField,
+    StopReason, THERE, TrajectoryField, WAIT, Word, parts_of, parts_of_named, things,
 };
 use avastra_lang::syntax::ast::{
     Action, ActionParam, Arm, BinaryOp, Call, Clause, ClauseKind, Effect, EffectKind, Expr, ExprKind, Field,
@@ -134,9 +134,9 @@ fn name_of(expr: &Expr) -> Option<&str> {
 }
 
 /// The fields that a block does not have yet.
-fn unused<W: Word>(fields: &[Field]) -> Vec<Kind> {
-    let has = |word: &str| fields.iter().any(|field| field.name.text == word);
-    vec![Kind::Words(words::of::<W>().into_iter().filter(|(word, _)| !has(word)).collect())]
+fn unused<W: Word>(fields: &[Field], of: &[W]) -> Vec<Kind> {
+    let is_left = |word: &&W| fields.iter().all(|field| field.name.text != word.name());
+    vec![Kind::Words(of.iter().filter(is_left).map(|word| (word.name(), word.meaning())).collect())]
 }
 
 /// What the expressions of a declaration are about.
@@ -282,13 +282,13 @@ impl<'a> Place<'a> {
             }
             EffectKind::Order { who, fields } if who.text == LIGHT.0 => fields.iter().find_map(|field| {
                 if is_here(&field.name) {
-                    return Some(unused::<LightField>(fields));
+                    return Some(unused(fields, LightField::ALL));
                 }
                 let words = Kind::Words(words::light_words(&field.name.text));
                 self.word_or_value(words, &field.value, None)
             }),
             EffectKind::Order { fields, .. } => fields.iter().find_map(|field| match is_here(&field.name) {
-                true => Some(unused::<CommandField>(fields)),
+                true => Some(unused(fields, &Told::of_orders())),
                 false => self.in_command(field),
             }),
             EffectKind::Spawn(spawn) if spawn.of.as_ref().is_some_and(is_here) => Some(self.road_users()),
@@ -326,7 +326,7 @@ impl<'a> Place<'a> {
         ];
         let clause = |(clause, ty): (&Option<Expr>, Option<Type>)| self.within(clause.as_ref()?, ty, ty);
         let of_field = |field: &Field| match is_here(&field.name) {
-            true => Some(unused::<CommandField>(&phase.fields)),
+            true => Some(unused(&phase.fields, &Told::of_orders())),
             false => self.in_command(field),
         };
         clauses.into_iter().find_map(clause).or_else(|| phase.fields.iter().find_map(of_field))
@@ -334,20 +334,20 @@ impl<'a> Place<'a> {
 
     /// In the value of a field of an order or a phase.
     fn in_command(&self, field: &Field) -> Option<Vec<Kind>> {
-        match CommandField::from_name(&field.name.text) {
-            Some(CommandField::Then) => self.word_or_value(Kind::Manoeuvres, &field.value, None),
-            Some(CommandField::To) => self.word_or_value(Kind::RoadUsers, &field.value, None),
-            Some(CommandField::Lane | CommandField::Ignores | CommandField::Lights | CommandField::Turn) => {
-                self.word_or_value(Kind::Words(words::engine_words(&field.name.text)), &field.value, None)
+        match Told::from_name(&field.name.text) {
+            Some(Told::Then) => self.word_or_value(Kind::Manoeuvres, &field.value, None),
+            Some(Told::To) => self.word_or_value(Kind::RoadUsers, &field.value, None),
+            _ => {
+                let words = Kind::Words(words::engine_words(&field.name.text));
+                self.word_or_value(words, &field.value, None)
             }
-            _ => self.within(&field.value, None, None),
         }
     }
 
     fn in_spawn(&self, fields: &[Field]) -> Option<Vec<Kind>> {
         fields.iter().find_map(|field| {
             if is_here(&field.name) {
-                return Some(unused::<SpawnField>(fields));
+                return Some(unused(fields, &Told::of_spawns()));
             }
             let words = Kind::Words(words::engine_words(&field.name.text));
             self.word_or_value(words, &field.value, None)
@@ -379,7 +379,7 @@ impl<'a> Place<'a> {
         fields
             .iter()
             .find_map(|field| match (field.name.text.as_str(), &field.value.kind) {
-                (HERE, _) => Some(unused::<RoadField>(fields)),
+                (HERE, _) => Some(unused(fields, RoadField::ALL)),
                 ("map", ExprKind::Text(path)) if path == HERE => {
                     Some(vec![Kind::Files("xodr", self.written.to_owned())])
                 }
@@ -393,7 +393,7 @@ impl<'a> Place<'a> {
         let in_point = |point: &Expr| match &point.kind {
             ExprKind::Name(name) if name == HERE => Some(vec![Kind::Keyword("lane")]),
             ExprKind::Record(fields) => fields.iter().find_map(|field| match &field.value.kind {
-                _ if is_here(&field.name) => Some(unused::<PointField>(fields)),
+                _ if is_here(&field.name) => Some(unused(fields, PointField::ALL)),
                 ExprKind::Name(name) if name == HERE && field.name.text == PointField::At.name() => {
                     Some(vec![Kind::Keyword("lane")])
                 }
@@ -402,7 +402,7 @@ impl<'a> Place<'a> {
             _ => None,
         };
         fields.iter().find_map(|field| match &field.value.kind {
-            _ if is_here(&field.name) => Some(unused::<TrajectoryField>(fields)),
+            _ if is_here(&field.name) => Some(unused(fields, TrajectoryField::ALL)),
             ExprKind::Name(name) if name == HERE && field.name.text == TrajectoryField::Road.name() => {
                 Some(vec![Kind::Roads])
             }
@@ -413,7 +413,7 @@ impl<'a> Place<'a> {
 
     fn in_episode(&self, fields: &[Field]) -> Option<Vec<Kind>> {
         let of_field = |field: &Field| match (field.name.text.as_str(), &field.value.kind) {
-            (HERE, _) => Some(unused::<EpisodeField>(fields)),
+            (HERE, _) => Some(unused(fields, EpisodeField::ALL)),
             (_, ExprKind::List(items)) if items.iter().any(is_named_here) => Some(vec![Kind::Roads]),
             ("stop", _) if self.holds_here(&field.value) => {
                 Some(vec![Kind::Words(words::of::<StopReason>())])

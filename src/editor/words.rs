@@ -1,10 +1,10 @@
 //! The words that no file declares, as lists for the editor. The keywords stand in `syntax::keyword`, the
 //! engine's words in `model::vocabulary`.
 
+use avastra_lang::model::field::Kind;
 use avastra_lang::model::vocabulary::{
-    BEGINS, Body, Colour, CommandField, EpisodeField, LaneChoice, LightColour, LightField, NearWord,
-    NumberWord, PastWord, ROAD_USER, RoadField, SINCE, ShownLights, Side, Site, SpawnField, StartField,
-    TYPES, Then, TrafficRule, Turning, Verb, Word,
+    BEGINS, Body, Colour, EpisodeField, Field, LightColour, LightField, NearWord, NumberWord, PastWord,
+    ROAD_USER, RoadField, SINCE, Side, Site, StartField, TYPES, Then, TrafficRule, Verb, Word,
 };
 use avastra_lang::model::{DRIVERS, ENDS, MODULES};
 
@@ -40,28 +40,19 @@ pub fn facts(site: Site) -> Vec<Entry> {
         .collect()
 }
 
-/// The words for a field of a spawn; `body` is what stands before `ahead` or `behind`.
+/// The words for a field of a spawn or an order; `body` is what stands before `ahead` or `behind`.
 pub fn engine_words(field: &str) -> Vec<Entry> {
-    match SpawnField::from_name(field) {
-        Some(SpawnField::Does) => of::<Verb>(),
-        Some(SpawnField::Lane) => of::<LaneChoice>(),
-        Some(SpawnField::Side) => of::<Side>(),
-        Some(SpawnField::Then) => of::<Then>(),
-        Some(SpawnField::Colour) => of::<Colour>(),
-        Some(SpawnField::Ignores) => of::<TrafficRule>(),
-        Some(SpawnField::Turn) => of::<Turning>(),
-        Some(SpawnField::Lights) => of::<ShownLights>(),
-        None if field == "body" => of::<Body>(),
-        Some(
-            SpawnField::Speed
-            | SpawnField::Offset
-            | SpawnField::Count
-            | SpawnField::Meet
-            | SpawnField::Waits
-            | SpawnField::Early
-            | SpawnField::Siren,
-        )
-        | None => Vec::new(),
+    let Some(field) = Field::from_name(field) else {
+        return if field == "body" { of::<Body>() } else { Vec::new() };
+    };
+    match (field, field.kind()) {
+        (_, Kind::Word(kind)) => (kind.words)(),
+        (_, Kind::Rules) => of::<TrafficRule>(),
+        (Field::Does, _) => of::<Verb>(),
+        (Field::Side, _) => of::<Side>(),
+        (Field::Then, _) => of::<Then>(),
+        (Field::Colour, _) => of::<Colour>(),
+        _ => Vec::new(),
     }
 }
 
@@ -89,13 +80,7 @@ pub fn drivers() -> Vec<Entry> {
 
 /// What a field of a block means: of a spawn, an order, a road, an episode or a start.
 pub fn field(word: &str) -> Option<&'static str> {
-    let blocks = [
-        of::<SpawnField>(),
-        of::<CommandField>(),
-        of::<RoadField>(),
-        of::<EpisodeField>(),
-        of::<StartField>(),
-    ];
+    let blocks = [of::<Field>(), of::<RoadField>(), of::<EpisodeField>(), of::<StartField>()];
     blocks.iter().find_map(|fields| meaning(fields, word))
 }
 

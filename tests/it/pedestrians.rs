@@ -6,8 +6,7 @@ use avastra::action::{Effect, SpawnRequest, Surroundings};
 use avastra::ads;
 use avastra::episode::Outcome;
 use avastra::geometry::distance_m;
-use avastra::model::command::IgnoredRules;
-use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, ShownLights, Side, Then, TimeOfDay, Verb};
+use avastra::model::vocabulary::{Body, Level, Side, TimeOfDay, Verb};
 use avastra::sim::{Control, Obstacle, Scene, Start, World};
 
 use crate::world::{assert_replays, run_of, space, space_at};
@@ -18,31 +17,7 @@ const SPAWNS: usize = 150;
 const HALF_WIDTH_M: f64 = 0.25;
 
 fn walks_ahead(side: Side, distance_m: f64, speed_mps: f64, cover: Option<Body>) -> SpawnRequest {
-    SpawnRequest {
-        body: Body::Pedestrian,
-        colour: Colour::Black,
-        verb: Verb::Walk,
-        lane: LaneChoice::Current,
-        side,
-        then: Then::Keep,
-        speed_mps,
-        distance_m,
-        own: None,
-        cover_own: None,
-        cover,
-        offset_m: 0.0,
-        ignores: IgnoredRules::default(),
-        meet: None,
-        waits_s: None,
-        early_s: None,
-        behind_first_m: 0.0,
-        first_m: None,
-        siren: false,
-        turn: None,
-        lights: ShownLights::Off,
-        trajectory: None,
-        bearer: None,
-    }
+    SpawnRequest { side, cover, ..SpawnRequest::new(Verb::Walk, distance_m, speed_mps) }
 }
 
 #[test]

@@ -126,7 +126,7 @@ pub(super) fn verdict(
         return does_phases(seen);
     }
     // Who was told to be beside the middle of its lane may be beside the road, or on the other side of it.
-    let told_aside = request.offset_m != 0.0;
+    let told_aside = request.offset_m() != 0.0;
     let drives = || match told_aside {
         true => Ok(()),
         false => seen.frames.iter().try_for_each(|frame| stays_on_road(scene, frame)),
@@ -140,7 +140,7 @@ pub(super) fn verdict(
         Verb::DriveAhead => {
             drives()?;
             appears_ahead(scene, request, first)?;
-            if request.turn.is_some() {
+            if request.told.turn().is_some() {
                 return has_turned(scene, seen);
             }
             moves(request, seen)?;
@@ -151,7 +151,7 @@ pub(super) fn verdict(
             if ahead_m(first) > 0.0 {
                 return Err("it does not appear behind the ego vehicle".to_owned());
             }
-            if request.turn.is_some() {
+            if request.told.turn().is_some() {
                 return has_turned(scene, seen);
             }
             moves(request, seen)?;
@@ -162,7 +162,7 @@ pub(super) fn verdict(
             if ahead_m(first) > 0.0 {
                 return Err("it does not appear behind the ego vehicle".to_owned());
             }
-            if request.turn.is_some() {
+            if request.told.turn().is_some() {
                 return has_turned(scene, seen);
             }
             let Some(passed) = seen.frames.iter().position(|frame| ahead_m(frame) > 0.0) else {
@@ -177,7 +177,7 @@ pub(super) fn verdict(
             if turned_rad(first) < OPPOSES_RAD {
                 return Err("it does not appear against the direction of the route".to_owned());
             }
-            if request.turn.is_some() {
+            if request.told.turn().is_some() {
                 return has_turned(scene, seen);
             }
             meets(seen)?;
@@ -237,7 +237,7 @@ fn appears_ahead(scene: &Scene, request: &SpawnRequest, first: &Frame) -> Result
     }
     let own = scene.map.lane(scene.route.lane_at(first.route_station_m).lane);
     let aside_m = own.centre.project(first.outline.pose.position).offset_m;
-    let aside_m = aside_m - request.offset_m;
+    let aside_m = aside_m - request.offset_m();
     let is_there = match request.lane {
         LaneChoice::Left => aside_m > BESIDE_M,
         LaneChoice::Current => aside_m.abs() < BESIDE_M,
@@ -321,7 +321,7 @@ fn crosses(request: &SpawnRequest, seen: &Sighting) -> Result<usize, String> {
     };
     let frame = &seen.frames[index];
     // Unless it is to come after the ego vehicle.
-    let comes_after = request.early_s.is_some_and(|early_s| early_s < 0.0);
+    let comes_after = request.told.early_s().is_some_and(|early_s| early_s < 0.0);
     if !comes_after && frame.route_station_m < VehicleParameters::MKZ.rear_m(frame.ego_station_m) {
         return Err("it came when the ego vehicle had passed".to_owned());
     }
@@ -343,7 +343,7 @@ fn walks(request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
 
 fn walks_along(request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
     let first = &seen.frames[0];
-    if (first.route_offset_m - request.offset_m).abs() > BESIDE_M {
+    if (first.route_offset_m - request.offset_m()).abs() > BESIDE_M {
         return Err("it does not appear where it was asked to beside the route".to_owned());
     }
     let last = &seen.frames[seen.frames.len() - 1];
@@ -357,7 +357,7 @@ fn walks_along(request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
 fn stands(request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
     let first = &seen.frames[0];
     let stands = seen.frames.iter().all(|frame| frame.velocity_mps.norm() == 0.0);
-    let is_there = (first.route_offset_m - request.offset_m).abs() < first.ego.half_width_m;
+    let is_there = (first.route_offset_m - request.offset_m()).abs() < first.ego.half_width_m;
     if stands && is_there { Ok(()) } else { Err("it does not stand where it was asked to".to_owned()) }
 }
 

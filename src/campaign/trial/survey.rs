@@ -16,7 +16,7 @@ use avastra_base::threads::in_order;
 use avastra_drivers::Ads;
 use avastra_lang::model::Row;
 use avastra_lang::model::command::Command;
-use avastra_lang::model::vocabulary::Phenomenon;
+use avastra_lang::model::vocabulary::{Field, Phenomenon};
 use avastra_world::action::{ActionTable, Count, Draw, Effect, Offer, SpawnRequest};
 use avastra_world::sim::{Sensed, World};
 
@@ -295,7 +295,11 @@ fn attempt(moment: &Moment, draw: &Draw, bearers: &[String]) -> Try {
     };
     for (nth, id) in watched.iter().copied() {
         let (request, told) = match &draw.effects[nth] {
-            Effect::Spawn(request) => (Some(request), Command { turn: request.turn, ..Command::default() }),
+            Effect::Spawn(request) => {
+                let mut turns = Command::default();
+                turns.set(Field::Turn, request.told.get(Field::Turn).copied());
+                (Some(request), turns)
+            }
             Effect::Order(order) => (None, order.command),
             Effect::Time(_) | Effect::Sky(..) | Effect::Light(_) => continue,
         };

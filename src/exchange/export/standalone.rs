@@ -10,8 +10,7 @@ use avastra_base::units::decimal;
 use avastra_campaign::emit::{identifier, lane_point, quoted};
 use avastra_campaign::episode::{EpisodeLog, Outcome};
 use avastra_lang::model::body::parameters;
-use avastra_lang::model::command::{Command, IgnoredRules};
-use avastra_lang::model::vocabulary::{Body, Phenomenon, ShownLights, TrajectoryField, Verb, Word};
+use avastra_lang::model::vocabulary::{Body, Phenomenon, TrajectoryField, Verb, Word};
 use avastra_lang::model::{
     BodyDef, Memory, Road, SPAWN_SPEED_MPS, Scenario, SignalProgram, Space, TrajectoryDef, ticks_s,
 };
@@ -136,7 +135,7 @@ impl<'a> Actions<'a> {
             }
             Effect::Order(OrderRequest { bearer, command, .. }) => {
                 // An order of a manoeuvre, which the text lacks, lets its bearer drive on.
-                let fields = command_fields(space, command);
+                let fields = command.written(&space.bearers).join(", ");
                 let name = &space.bearers[*bearer];
                 if fields.is_empty() { fields } else { format!("order {name} {{ {fields} }}") }
             }
@@ -186,30 +185,7 @@ impl<'a> Actions<'a> {
         if request.verb != Verb::Stand {
             fields.push(format!("speed: {} m/s", decimal(request.speed_mps, false)));
         }
-        if request.offset_m != 0.0 {
-            fields.push(format!("offset: {} m", decimal(request.offset_m, false)));
-        }
-        if let Some(meet) = request.meet {
-            fields.push(format!("meet: {}", decimal(meet, false)));
-        }
-        if let Some(early_s) = request.early_s {
-            fields.push(format!("early: {} s", decimal(early_s, false)));
-        }
-        if let Some(waits_s) = request.waits_s {
-            fields.push(format!("waits: {} s", decimal(waits_s, false)));
-        }
-        if request.siren {
-            fields.push("siren: true".to_owned());
-        }
-        if request.lights != ShownLights::Off {
-            fields.push(format!("lights: {}", request.lights.name()));
-        }
-        if let Some(turn) = request.turn {
-            fields.push(format!("turn: {}", turn.name()));
-        }
-        if !request.ignores.is_empty() {
-            fields.push(ignored_field(request.ignores));
-        }
+        fields.extend(request.told.written(&space.bearers));
         fields.push(format!("colour: {}", request.colour.name()));
         // Nor how far behind the first of a row somebody comes to a junction.
         self.is_moved |= request.behind_first_m != 0.0;
@@ -331,59 +307,4 @@ fn start_text(log: &EpisodeLog) -> String {
         start.ambient,
         start.seed
     )
-}
-
-fn ignored_field(ignores: IgnoredRules) -> String {
-    let ignored: Vec<&str> = ignores.iter().map(Word::name).collect();
-    format!("ignores: [{}]", ignored.join(", "))
-}
-
-/// What a command says, as the fields of an order.
-fn command_fields(space: &Space, command: &Command) -> String {
-    let Command {
-        speed_mps,
-        rate_mps2,
-        // Of phases alone, which are written as they stand.
-        is_continuous: _,
-        lane,
-        offset_m,
-        aside_mps,
-        aside_s,
-        time_gap_s,
-        keep_m,
-        keep_s,
-        to,
-        early_s,
-        at_m,
-        reach_m,
-        steady_m,
-        ignores,
-        siren,
-        turn,
-        lights,
-    } = command;
-    let figure = |name: &str, value: &Option<f64>, unit: &str| {
-        value.map(|value| format!("{name}: {} {unit}", decimal(value, false)))
-    };
-    let fields = [
-        figure("speed", speed_mps, "m/s"),
-        figure("rate", rate_mps2, "m/s^2"),
-        lane.map(|lane| format!("lane: {}", lane.name())),
-        figure("offset", offset_m, "m"),
-        figure("aside", aside_mps, "m/s"),
-        figure("aside", aside_s, "s"),
-        figure("time_gap", time_gap_s, "s"),
-        figure("keep", keep_m, "m"),
-        figure("keep", keep_s, "s"),
-        to.map(|who| format!("to: {}", space.bearers[who])),
-        figure("early", early_s, "s"),
-        figure("at", at_m, "m"),
-        figure("reach", reach_m, "m"),
-        figure("steady", steady_m, "m"),
-        ignores.map(ignored_field),
-        siren.map(|siren| format!("siren: {siren}")),
-        turn.map(|turn| format!("turn: {}", turn.name())),
-        lights.map(|lights| format!("lights: {}", lights.name())),
-    ];
-    fields.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }

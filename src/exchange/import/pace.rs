@@ -1,7 +1,7 @@
 //! How fast speeds change: what vehicles can, and profiles of speeds over time as phases.
 
 use avastra_lang::model::SPAWN_SPEED_MPS;
-use avastra_lang::model::command::RATE_MPS2;
+use avastra_lang::model::field::RATE_MPS2;
 
 use super::action::{Bounds, Dynamics, Headway, Kept, Meeting, Over, Speed, SpeedEntry, Steady};
 use super::body::Body;

@@ -12,6 +12,7 @@ use crate::check::references::{PARAMETERS_MAX, Symbol};
 use crate::check::report::{Report, all_of, as_written, field};
 use crate::check::rule::locals;
 use crate::model::expr::Expr;
+use crate::model::field::WordKind;
 use crate::model::rules::rules_by_action;
 use crate::model::vocabulary::{LIGHT, LightColour, LightField, Site, SpaceClaim, Word};
 use crate::model::{
@@ -345,7 +346,7 @@ impl Checker {
 
     /// What the ego vehicle's next traffic light is told.
     fn light(&mut self, fields: &[ast::Field], place: &Place<'_>, span: Span) -> Option<LightDef> {
-        self.note_fields::<LightField>(fields, place);
+        self.note_fields(fields, LightField::ALL, place);
         let fields = self.fields_known::<LightField>(fields);
         let colour = match field(&fields, LightField::Colour) {
             Some(value) => self.word::<LightColour>("colour of a light", value, place),
@@ -359,17 +360,37 @@ impl Checker {
         Some(LightDef { colour: colour?, at: as_written(at)? })
     }
 
+    /// A word of the engine.
     pub(super) fn word<W: Word>(
         &mut self,
-        kind: &str,
+        kind: &'static str,
         expr: &ast::Expr,
         place: &Place<'_>,
     ) -> Option<WordExpr<W>> {
+        let word = |place: u8| W::ALL[usize::from(place)];
+        Some(match self.word_among(WordKind::of::<W>(kind), expr, place)? {
+            WordExpr::Fixed(one) => WordExpr::Fixed(word(one)),
+            WordExpr::Of(expr, words) => WordExpr::Of(expr, words.into_iter().map(word).collect()),
+        })
+    }
+
+    /// A word of the engine of that kind, by its place among those.
+    pub(super) fn word_among(
+        &mut self,
+        kind: WordKind,
+        expr: &ast::Expr,
+        place: &Place<'_>,
+    ) -> Option<WordExpr<u8>> {
+        let words = (kind.words)();
+        let named = |name: &str| (0..).zip(&words).find(|(_, (word, _))| *word == name);
         let known = |_: &Checker, name: &str, span| {
-            W::from_name(name).ok_or_else(|| unknown_word::<W>(kind, name, span))
+            let names = words.iter().map(|(word, _)| *word);
+            named(name).map(|(nth, _)| nth).ok_or_else(|| unknown_word(kind.called, name, names, span))
         };
-        let note = |checker: &mut Checker, span, name: &str| checker.references.word_named::<W>(span, name);
-        self.word_or_enum(kind, expr, place, known, note)
+        let note = |checker: &mut Checker, span, name: &str| {
+            named(name).iter().for_each(|(_, word)| checker.references.engine(span, **word));
+        };
+        self.word_or_enum(kind.called, expr, place, known, note)
     }
 
     /// A word: either the word itself, which is then noted, or an expression of an enum whose variants are such words.

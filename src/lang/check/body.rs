@@ -41,7 +41,7 @@ impl Checker {
     }
 
     pub(super) fn body(&mut self, item: &ast::Item, declared: &ast::Block) -> Option<BodyDef> {
-        self.note_fields::<BodyField>(&declared.fields, &Place::default());
+        self.note_fields(&declared.fields, BodyField::ALL, &Place::default());
         let fields = self.fields_known::<BodyField>(&declared.fields);
         let name = &declared.name;
         if Body::from_name(&name.text).is_some() || BodyClass::from_name(&name.text).is_some() {
@@ -91,7 +91,7 @@ impl Checker {
         };
         let found = Body::from_name(name);
         found.into_iter().for_each(|body| self.references.word(expr.span, body));
-        found.or_else(|| self.reject(unknown_word::<Body>("body", name, expr.span)))
+        found.or_else(|| self.reject(unknown_word("body", name, Body::names(), expr.span)))
     }
 
     /// A number of a body in SI; `None` if it is not given, or broken.
@@ -154,7 +154,7 @@ impl Checker {
 
 /// A body that neither the engine nor the author has.
 fn unknown_body(name: &str, span: Span) -> Diagnostic {
-    let error = unknown_word::<Body>("body", name, span);
+    let error = unknown_word("body", name, Body::names(), span);
     match nearest(name, Body::names()) {
         Some(_) => error,
         None => error

@@ -542,7 +542,7 @@ impl Checker {
     /// The engine's word for each variant of an enum, for values that reach the world.
     pub(super) fn words<W: Word>(&mut self, kind: &str, ty: Type, span: Span) -> Option<Vec<W>> {
         self.words_of(kind, ty, span, |_, variant, at| {
-            W::from_name(variant).ok_or_else(|| unknown_word::<W>(kind, variant, at))
+            W::from_name(variant).ok_or_else(|| unknown_word(kind, variant, W::names(), at))
         })
     }
 
@@ -572,9 +572,14 @@ impl Checker {
     }
 }
 
-/// A word that the engine does not know.
-pub(super) fn unknown_word<W: Word>(kind: &str, word: &str, span: Span) -> Diagnostic {
-    let words: Vec<&str> = W::ALL.iter().map(|word| word.name()).collect();
+/// A word that is not among those of the engine.
+pub(super) fn unknown_word<'a>(
+    kind: &str,
+    word: &str,
+    words: impl Iterator<Item = &'a str>,
+    span: Span,
+) -> Diagnostic {
+    let words: Vec<&str> = words.collect();
     let error =
         Diagnostic::error(code::NOT_A_WORD, format!("the engine knows no {kind} `{word}`")).at(span, "");
     match nearest(word, words.iter().copied()) {

@@ -168,9 +168,9 @@ impl Checker {
     }
 
     /// Notes the names of fields, and looks at the values of fields that do not exist.
-    pub(super) fn note_fields<W: Word>(&mut self, fields: &[ast::Field], place: &Place<'_>) {
+    pub(super) fn note_fields<W: Word>(&mut self, fields: &[ast::Field], among: &[W], place: &Place<'_>) {
         for field in fields {
-            match W::from_name(&field.name.text) {
+            match W::from_name(&field.name.text).filter(|word| among.contains(word)) {
                 Some(word) => self.references.word(field.name.span, word),
                 None => self.look_at(&field.value, place, None),
             }

@@ -9,10 +9,8 @@ use crate::check::references::Symbol;
 use crate::check::report::{Report, all_of, as_written, field};
 use crate::model::command::{CommandDef, Moves, Told};
 use crate::model::expr::{Expr, ExprKind, Who};
-use crate::model::vocabulary::{
-    Body, CHANGE, CommandField, Fact, LIGHT, LaneChoice, ROAD_USER, ShownLights, Site, SpawnField,
-    TrafficRule, Turning, Verb, Word,
-};
+use crate::model::field::{Fields, Kind, Term, Unit};
+use crate::model::vocabulary::{Body, CHANGE, Fact, Field, LIGHT, ROAD_USER, Site, TrafficRule, Verb, Word};
 use crate::model::{
     EnumDef, ManoeuvreCall, ManoeuvreDef, OrderDef, PhaseDef, REPEAT, Type, WordExpr, code, reached, told,
 };
@@ -21,8 +19,6 @@ use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use avastra_base::units::Dimension;
 
-const LENGTH: Type = Type::Quantity(Dimension::LENGTH);
-const SPEED: Type = Type::Quantity(Dimension::SPEED);
 const DURATION: Type = Type::Quantity(Dimension::DURATION);
 
 /// Times that a phase waits, s.
@@ -49,7 +45,7 @@ impl Checker {
                 let like = own.map(|own| own.like).or_else(|| Body::from_name(name));
                 like.is_some_and(|like| !like.is_vehicle())
             };
-            let does = fields.iter().find(|field| field.name.text == SpawnField::Does.name());
+            let does = fields.iter().find(|field| field.name.text == Field::Does.name());
             let verb = does.and_then(|field| match &field.value.kind {
                 ast::ExprKind::Name(verb) => Verb::from_name(verb),
                 _ => None,
@@ -135,7 +131,7 @@ impl Checker {
             .iter()
             .map(|(_, manoeuvre)| {
                 let fields = manoeuvre.phases.iter().flat_map(|phase| &phase.fields);
-                let then = fields.filter(|field| field.name.text == CommandField::Then.name());
+                let then = fields.filter(|field| field.name.text == Field::Then.name());
                 let calls = then.filter_map(|field| match &field.value.kind {
                     ast::ExprKind::Call(call) => {
                         Some((self.manoeuvre_names.get(&call.name.text)?, call.span))
@@ -290,9 +286,10 @@ impl Checker {
         let within = part(self, declared.within.as_ref(), DURATION);
         let after = part(self, declared.after.as_ref(), DURATION);
         let only_if = part(self, declared.only_if.as_ref(), Type::Bool);
-        self.note_fields::<CommandField>(&declared.fields, place);
-        let fields = self.fields_known(&declared.fields);
-        let then = match field(&fields, CommandField::Then) {
+        let among = Field::of_orders();
+        self.note_fields(&declared.fields, &among, place);
+        let fields = self.fields_among(&declared.fields, &among);
+        let then = match field(&fields, Field::Then) {
             Some(value) => match self.manoeuvre_call(value, place) {
                 Some(call) => Some(call),
                 None => return self.no_manoeuvre(value, place),
@@ -302,21 +299,21 @@ impl Checker {
         let command = self.command(&fields, place);
         if let Some(command) = &command {
             for figure in command.figures() {
-                self.check_figure(figure.expr, figure.field.name(), figure.unit, &figure.bounds);
+                self.check_figure(figure.expr, figure.field.name(), figure.unit.name, &figure.unit.bounds);
             }
         }
         for (expr, name) in [(&held, "for"), (&within, "within"), (&after, "after")] {
             expr.iter().for_each(|expr| self.check_figure(expr, name, "s", &TIME_S));
         }
         let waits = declared.fields.is_empty() && (declared.once.is_some() || declared.after.is_some());
-        let tells_nothing = matches!(&command, Some(command) if *command == CommandDef::default());
+        let tells_nothing = command.as_ref().is_some_and(CommandDef::is_empty);
         if tells_nothing && then.is_none() && !waits {
             // A misspelt field was reported.
             if fields.len() < declared.fields.len() {
                 return None;
             }
             let message = "the phase tells the vehicle nothing".to_owned();
-            return self.missing_field(CommandField::Speed, declared.span, message);
+            return self.missing_field(Field::Speed, declared.span, message);
         }
         if let (Some(within), None) = (&declared.within, &declared.once) {
             let error =
@@ -358,9 +355,10 @@ impl Checker {
         span: Span,
     ) -> Option<OrderDef> {
         let bearer = self.named_road_user(who, place);
-        self.note_fields::<CommandField>(fields, place);
-        let (declared, fields) = (fields.len(), self.fields_known(fields));
-        let manoeuvre = match field(&fields, CommandField::Then) {
+        let among = Field::of_orders();
+        self.note_fields(fields, &among, place);
+        let (declared, fields) = (fields.len(), self.fields_among(fields, &among));
+        let manoeuvre = match field(&fields, Field::Then) {
             Some(value) => match self.manoeuvre_call(value, place) {
                 Some(call) => Some(call?),
                 None => return self.no_manoeuvre(value, place),
@@ -368,25 +366,24 @@ impl Checker {
             None => None,
         };
         let command = self.command(&fields, place)?;
-        if let Some(continuous) = &command.continuous {
+        if let Some(continuous) = command.expr(Field::Continuous) {
             let error = Diagnostic::error(code::NOT_HERE, "only the `speed` of a phase is `continuous`");
             let error = error.at(continuous.span, "in an order, whose numbers are drawn");
             return self.reject(error.help("write a manoeuvre with that phase, and order `then: …`"));
         }
-        if let (Some(to), true) = (field(&fields, CommandField::To), bearer.is_some() && command.to == bearer)
-        {
+        if let (Some(to), true) = (field(&fields, Field::To), bearer.is_some() && command.to() == bearer) {
             let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, "nobody keeps a gap to itself");
             let help = "name somebody else, or leave `to` out: then the gap is to the ego vehicle";
             return self
                 .reject(error.at(to.span, format!("this is who is ordered, `{}`", who.text)).help(help));
         }
-        if manoeuvre.is_none() && command == CommandDef::default() {
+        if manoeuvre.is_none() && command.is_empty() {
             // A misspelt field was reported.
             if fields.len() < declared {
                 return None;
             }
             let message = "the order tells the vehicle nothing".to_owned();
-            return self.missing_field(CommandField::Speed, span, message);
+            return self.missing_field(Field::Speed, span, message);
         }
         let told = manoeuvre.as_ref().map_or(Told::NOTHING, |call| self.told(call.manoeuvre));
         let has = match bearer {
@@ -428,75 +425,32 @@ impl Checker {
     }
 
     /// What the fields of an order or a phase tell a vehicle; `None` after a mistake, which is reported.
-    fn command(&mut self, fields: &[(CommandField, &ast::Expr)], place: &Place<'_>) -> Option<CommandDef> {
+    fn command(&mut self, fields: &[(Field, &ast::Expr)], place: &Place<'_>) -> Option<CommandDef> {
+        let command = self.told_by(fields, place);
         let mut all = true;
-        let mut figure = |wanted: CommandField, dimension: Dimension| {
-            let found = self.typed(field(fields, wanted)?, place, Type::Quantity(dimension));
-            all &= found.is_some();
-            found
-        };
-        let speed = figure(CommandField::Speed, Dimension::SPEED);
-        let rate = figure(CommandField::Rate, Dimension::ACCEL);
-        let offset = figure(CommandField::Offset, Dimension::LENGTH);
-        let time_gap = figure(CommandField::TimeGap, Dimension::DURATION);
-        let early = figure(CommandField::Early, Dimension::DURATION);
-        let at = figure(CommandField::At, Dimension::LENGTH);
-        let reach = figure(CommandField::Reach, Dimension::LENGTH);
-        let steady = figure(CommandField::Steady, Dimension::LENGTH);
-        let keep = field(fields, CommandField::Keep).map(|value| {
-            let help = "write a way or a time: `keep: 20 m`, `keep: 1.5 s`";
-            self.either(value, [LENGTH, DURATION], ("`keep` is a gap", help), place)
-        });
-        let aside = field(fields, CommandField::Aside).map(|value| {
-            let message = "`aside` is a speed to the side, or how long the move takes";
-            let help = "write `aside: 1.5 m/s`, or `aside: 3 s`";
-            self.either(value, [SPEED, DURATION], (message, help), place)
-        });
-        let to = field(fields, CommandField::To).map(|value| self.kept(value, place));
-        let lane =
-            field(fields, CommandField::Lane).map(|value| self.word::<LaneChoice>("lane", value, place));
-        let ignores = field(fields, CommandField::Ignores).map(|value| self.ignored_rules(value, place));
-        let siren = field(fields, CommandField::Siren).map(|value| self.typed(value, place, Type::Bool));
-        let continuous =
-            field(fields, CommandField::Continuous).map(|value| self.typed(value, place, Type::Bool));
-        let turn = field(fields, CommandField::Turn).map(|value| self.word::<Turning>("turn", value, place));
-        let lights = field(fields, CommandField::Lights)
-            .map(|value| self.word::<ShownLights>("kind of lights", value, place));
-        // All fields are read before one that is wrong leaves the order out.
-        let (keep, aside, to) = (as_written(keep)?, as_written(aside)?, as_written(to)?);
-        let (lane, ignores, siren) = (as_written(lane)?, as_written(ignores)?, as_written(siren)?);
-        let (continuous, turn, lights) = (as_written(continuous)?, as_written(turn)?, as_written(lights)?);
-        let says = |wanted: CommandField| field(fields, wanted).is_some();
-        let goes_aside = says(CommandField::Lane) || says(CommandField::Offset);
-        let (keeps, is_early) = (says(CommandField::Keep), says(CommandField::Early));
-        if let Some(value) = field(fields, CommandField::Early).filter(|_| keeps) {
+        let says = |wanted: Field| field(fields, wanted).is_some();
+        let goes_aside = says(Field::Lane) || says(Field::Offset);
+        let (keeps, is_early) = (says(Field::Keep), says(Field::Early));
+        if let Some(value) = field(fields, Field::Early).filter(|_| keeps) {
             let error = Diagnostic::error(code::NOT_HERE, "`keep` and `early` both say the speed");
             let error = error.at(value.span, "beside `keep`");
             self.report(error.help("leave one of the two out, or write them in two phases"));
             all = false;
         }
-        if let Some(value) = field(fields, CommandField::Continuous).filter(|_| keeps || is_early) {
+        if let Some(value) = field(fields, Field::Continuous).filter(|_| keeps || is_early) {
             let error =
                 Diagnostic::error(code::NOT_HERE, "`keep` and `early` say the speed at every tick already");
             self.report(error.at(value.span, "beside one of them").help("leave it out"));
             all = false;
         }
         for (part, of, is_there) in [
-            (CommandField::To, "a `keep`", keeps),
-            (CommandField::At, "an `early`", is_early),
-            (CommandField::Reach, "an `early` and an `at`", is_early && says(CommandField::At)),
-            (
-                CommandField::Steady,
-                "a `reach` and a `speed`",
-                says(CommandField::Reach) && says(CommandField::Speed),
-            ),
-            (
-                CommandField::Rate,
-                "a `speed`, a `keep` or an `early`",
-                says(CommandField::Speed) || keeps || is_early,
-            ),
-            (CommandField::Aside, "a `lane` or an `offset`", goes_aside),
-            (CommandField::Continuous, "a `speed`", says(CommandField::Speed)),
+            (Field::To, "a `keep`", keeps),
+            (Field::At, "an `early`", is_early),
+            (Field::Reach, "an `early` and an `at`", is_early && says(Field::At)),
+            (Field::Steady, "a `reach` and a `speed`", says(Field::Reach) && says(Field::Speed)),
+            (Field::Rate, "a `speed`, a `keep` or an `early`", says(Field::Speed) || keeps || is_early),
+            (Field::Aside, "a `lane` or an `offset`", goes_aside),
+            (Field::Continuous, "a `speed`", says(Field::Speed)),
         ] {
             if let Some(value) = field(fields, part).filter(|_| !is_there) {
                 let message = format!("`{}` belongs to {of}", part.name());
@@ -506,42 +460,59 @@ impl Checker {
                 all = false;
             }
         }
-        all.then_some(CommandDef {
-            speed,
-            rate,
-            continuous,
-            lane,
-            offset,
-            aside,
-            time_gap,
-            keep,
-            to,
-            early,
-            at,
-            reach,
-            steady,
-            ignores,
-            siren,
-            turn,
-            lights,
-        })
+        command.filter(|_| all)
     }
 
-    /// A quantity of one of two types. The message and the help are for another one.
+    /// What fields tell, but for those that are read by themselves; `None` after a mistake, which is reported. All are read before
+    /// one that is wrong leaves them out.
+    pub(super) fn told_by(
+        &mut self,
+        fields: &[(Field, &ast::Expr)],
+        place: &Place<'_>,
+    ) -> Option<Fields<Term>> {
+        let (mut told, mut all) = (Fields::default(), true);
+        for (field, value) in fields {
+            let quantity = |unit: &Unit| Type::Quantity(unit.dimension);
+            let term = match field.kind() {
+                Kind::Figure(unit, None) => {
+                    let expr = self.typed(value, place, quantity(&unit));
+                    expr.map(|expr| Term::Figure { expr, second: false })
+                }
+                Kind::Figure(first, Some(second)) => {
+                    let expr = self.either(*field, value, [&first, &second], place);
+                    expr.map(|expr| Term::Figure { second: expr.ty == quantity(&second), expr })
+                }
+                Kind::Truth => self.typed(value, place, Type::Bool).map(Term::Truth),
+                Kind::Word(kind) => self.word_among(kind, value, place).map(Term::Word),
+                Kind::Rules => self.ignored_rules(value, place).map(Term::Rules),
+                Kind::Who => self.kept(value, place).map(Term::Who),
+                Kind::Own => continue,
+            };
+            all &= term.is_some();
+            told.set(*field, term);
+        }
+        all.then_some(told)
+    }
+
+    /// A quantity in one of two units.
     fn either(
         &mut self,
+        field: Field,
         value: &ast::Expr,
-        types: [Type; 2],
-        (message, help): (&str, &str),
+        units: [&Unit; 2],
         place: &Place<'_>,
     ) -> Option<Expr> {
         let found = self.expr(value, place, None)?;
-        if types.contains(&found.ty) {
+        if units.iter().any(|unit| found.ty == Type::Quantity(unit.dimension)) {
             return Some(found);
         }
         let label = format!("this is a `{}`", self.references.type_name(found.ty));
-        let error = Diagnostic::error(code::UNIT_MISMATCH, message);
-        self.reject(error.at(value.span, label).help(help))
+        let [first, second] = units.map(|unit| self.references.type_name(Type::Quantity(unit.dimension)));
+        let message = format!("`{}` is a `{first}` or a `{second}`", field.name());
+        let error = Diagnostic::error(code::UNIT_MISMATCH, message).at(value.span, label);
+        // Its sentence ends with an example in each unit.
+        let examples = field.meaning().split_once(": `").map(|(_, examples)| examples.trim_end_matches('.'));
+        self.reject(error.help_if(examples.map(|examples| format!("write `{examples}"))))
     }
 
     /// The road user to whom a gap is kept.

@@ -329,7 +329,12 @@ impl References {
 
     /// Notes a word of the engine.
     pub(super) fn word(&mut self, span: Span, word: impl Word) {
-        self.note(span, Symbol::Engine(word.name(), word.meaning()), false);
+        self.engine(span, (word.name(), word.meaning()));
+    }
+
+    /// Notes a word of the engine, with its sentence.
+    pub(super) fn engine(&mut self, span: Span, (name, meaning): (&'static str, &'static str)) {
+        self.note(span, Symbol::Engine(name, meaning), false);
     }
 
     /// Notes the word of that spelling, if there is one.

@@ -47,12 +47,20 @@ pub(super) trait Report {
     /// The fields of a block with their values. Reports every field that stands twice or that the block
     /// does not have.
     fn fields_known<'a, W: Word>(&mut self, fields: &'a [Field]) -> Vec<(W, &'a ast::Expr)> {
+        self.fields_among(fields, W::ALL)
+    }
+
+    /// The same of a block that has only some of these fields.
+    fn fields_among<'a, W: Word>(&mut self, fields: &'a [Field], among: &[W]) -> Vec<(W, &'a ast::Expr)> {
         self.fields_once("field", fields);
         let mut known = Vec::new();
         for Field { name, value, .. } in fields {
-            match W::from_name(&name.text) {
+            match W::from_name(&name.text).filter(|word| among.contains(word)) {
                 Some(word) => known.push((word, value)),
-                None => self.report(unknown("field", &name.text, name.span, W::names())),
+                None => {
+                    let names = among.iter().map(|word| word.name());
+                    self.report(unknown("field", &name.text, name.span, names));
+                }
             }
         }
         known

@@ -12,7 +12,7 @@ use crate::check::report::Report;
 use crate::check::spawn::possible;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::states_read;
-use crate::model::vocabulary::{CHANGE, Known, Site, Then, Verb};
+use crate::model::vocabulary::{CHANGE, Field, Known, Site, Then, Verb};
 use crate::model::{
     ActionDef, EnumIndex, Initial, RuleBinding, RuleBody, RuleDef, SetDef, SpawnDef, Type, WordExpr, code,
 };
@@ -434,10 +434,10 @@ impl Checker {
             possible(&spawn.then).contains(&Then::Change) || possible(&spawn.verb).contains(&Verb::Overtake)
         };
         action.spawns().any(by_spawn)
-            || action.orders().any(|order| order.command.lane.is_some())
+            || action.orders().any(|order| order.command.says(Field::Lane))
             || action
                 .manoeuvres()
-                .any(|manoeuvre| self.has_command(manoeuvre, |command| command.lane.is_some()))
+                .any(|manoeuvre| self.has_command(manoeuvre, |command| command.says(Field::Lane)))
     }
 
     /// Reports a value from which no move is allowed, and a value to which no other value may move and with which no

@@ -54,7 +54,7 @@ impl Checker {
         let mut episode =
             EpisodeDef { step_s: STEP_S, stop_arrived: true, stalled_steps: None, step_limit: STEP_LIMIT };
         let mut roads = None;
-        self.note_fields::<EpisodeField>(fields, &Place::default());
+        self.note_fields(fields, EpisodeField::ALL, &Place::default());
         for (field, value) in self.fields_known(fields) {
             match field {
                 EpisodeField::Roads => roads = self.road_list(value),

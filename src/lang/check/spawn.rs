@@ -5,9 +5,7 @@ use crate::check::expression::Place;
 use crate::check::report::{Report, as_written, field};
 use crate::model::command::CommandDef;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::{
-    Colour, LaneChoice, ShownLights, Side, SpawnField, Then, Turning, Verb, Word,
-};
+use crate::model::vocabulary::{Colour, Field, LaneChoice, Side, Then, Verb, Word};
 use crate::model::{BodyWord, EffectDef, InRow, ManoeuvreCall, SpawnDef, Type, WordExpr, code};
 use crate::syntax::ast::Span;
 use crate::syntax::{Diagnostic, ast, listed};
@@ -15,19 +13,14 @@ use avastra_base::units::{Dimension, Rational};
 
 /// A field that means nothing to some verbs.
 struct IdleField {
-    field: SpawnField,
+    field: Field,
     is_idle: fn(Verb) -> bool,
     /// Why, of the verb.
     what: &'static str,
     help: &'static str,
 }
 
-const fn idle(
-    field: SpawnField,
-    is_idle: fn(Verb) -> bool,
-    what: &'static str,
-    help: &'static str,
-) -> IdleField {
+const fn idle(field: Field, is_idle: fn(Verb) -> bool, what: &'static str, help: &'static str) -> IdleField {
     IdleField { field, is_idle, what, help }
 }
 
@@ -38,7 +31,7 @@ const IDLE_FIELDS: [IdleField; 13] = {
     const WALKS: fn(Verb) -> bool = |verb| verb == Verb::Walk;
     const NO_WALK: fn(Verb) -> bool = |verb| verb != Verb::Walk;
     const NO_CROSSING: fn(Verb) -> bool = |verb| verb != Verb::CrossRoad;
-    use SpawnField::{Early, Ignores, Lane, Lights, Meet, Offset, Side, Siren, Turn, Waits};
+    use Field::{Early, Ignores, Lane, Lights, Meet, Offset, Side, Siren, Turn, Waits};
     [
         idle(
             Ignores,
@@ -145,7 +138,7 @@ impl Checker {
         is_row: bool,
         place: &Place<'_>,
     ) -> Option<Option<Expr>> {
-        let Some(field) = fields.iter().find(|field| field.name.text == SpawnField::Count.name()) else {
+        let Some(field) = fields.iter().find(|field| field.name.text == Field::Count.name()) else {
             return Some(None);
         };
         if !is_row {
@@ -172,70 +165,59 @@ impl Checker {
     /// What `spawn` says of one road user by itself, without its name and whom it stands beside.
     fn spawn(&mut self, spawn: &ast::Spawn, place: &Place<'_>, span: Span) -> Option<SpawnDef> {
         let ast::Spawn { body, place: begins, distance, of, fields, .. } = spawn;
-        self.note_fields::<SpawnField>(fields, place);
-        let fields = self.fields_known(fields);
-        let find = |wanted: SpawnField| field(&fields, wanted);
+        let among = Field::of_spawns();
+        self.note_fields(fields, &among, place);
+        let fields = self.fields_among(fields, &among);
+        let find = |wanted: Field| field(&fields, wanted);
         let lacks = |what: &str| format!("the spawn does not say {what}");
         let body_word = self.body_word(body, place);
         let distance = self.typed(distance, place, Type::Quantity(Dimension::LENGTH));
-        let verb = match find(SpawnField::Does) {
+        let verb = match find(Field::Does) {
             Some(value) => self.word::<Verb>("verb", value, place),
-            None => self.missing_field(SpawnField::Does, span, lacks("what it does")),
+            None => self.missing_field(Field::Does, span, lacks("what it does")),
         };
         let verb_words: Vec<Verb> = verb.as_ref().map(possible).unwrap_or_default();
         let needs = |verbs: &[Verb]| verb_words.iter().any(|verb| verbs.contains(verb));
-        let lane = match find(SpawnField::Lane) {
+        let lane = match find(Field::Lane) {
             Some(value) => self.word::<LaneChoice>("lane", value, place),
             None if needs(&[Verb::DriveAhead, Verb::DriveBehind, Verb::Overtake]) => {
-                self.missing_field(SpawnField::Lane, span, lacks("its lane"))
+                self.missing_field(Field::Lane, span, lacks("its lane"))
             }
             None => Some(WordExpr::Fixed(LaneChoice::Current)),
         };
-        let side = match find(SpawnField::Side) {
+        let side = match find(Field::Side) {
             Some(value) => self.word::<Side>("side", value, place),
             None if needs(&[Verb::CrossRoad, Verb::Walk]) => {
-                self.missing_field(SpawnField::Side, span, lacks("where it comes from"))
+                self.missing_field(Field::Side, span, lacks("where it comes from"))
             }
             None => Some(WordExpr::Fixed(Side::Right)),
         };
-        let then = match find(SpawnField::Then) {
+        let then = match find(Field::Then) {
             Some(value) => self.then(value, place),
             None => Some((WordExpr::Fixed(Then::Keep), None)),
         };
-        let colour = match find(SpawnField::Colour) {
+        let colour = match find(Field::Colour) {
             Some(value) => self.word::<Colour>("colour", value, place),
             None => Some(WordExpr::Fixed(Colour::Black)),
         };
         let speed_type = Type::Quantity(Dimension::SPEED);
-        let speed = match find(SpawnField::Speed) {
+        let speed = match find(Field::Speed) {
             Some(value) => self.typed(value, place, speed_type),
             None if verb_words == [Verb::Stand] => {
                 Some(Expr { kind: ExprKind::Number(Rational::ZERO), ty: speed_type, span })
             }
-            None => self.missing_field(SpawnField::Speed, span, lacks("how fast it is")),
+            None => self.missing_field(Field::Speed, span, lacks("how fast it is")),
         };
-        let mut quantity = |wanted: SpawnField, dimension: Dimension| {
-            find(wanted).map(|value| self.typed(value, place, Type::Quantity(dimension)))
-        };
-        let offset = quantity(SpawnField::Offset, Dimension::LENGTH);
-        let meet = quantity(SpawnField::Meet, Dimension::RATIO);
-        let early = quantity(SpawnField::Early, Dimension::DURATION);
-        let waits = quantity(SpawnField::Waits, Dimension::DURATION);
-        let ignores = match find(SpawnField::Ignores) {
-            Some(value) => self.ignored_rules(value, place),
-            None => Some(Vec::new()),
-        };
-        let siren = find(SpawnField::Siren).map(|value| self.typed(value, place, Type::Bool));
-        let lights =
-            find(SpawnField::Lights).map(|value| self.word::<ShownLights>("kind of lights", value, place));
-        let turn = find(SpawnField::Turn).map(|value| self.word::<Turning>("turn", value, place));
+        let is_read = |field: Field| matches!(field, Field::Lane | Field::Speed);
+        let others: Vec<_> = fields.iter().copied().filter(|(field, _)| !is_read(*field)).collect();
+        let told = self.told_by(&others, place);
         let (body, verb, (then, manoeuvre)) = (body_word?, verb?, then?);
         let behind = begins.is_behind();
         if of.is_none() && begins.trajectory().is_none() {
             self.check_side(&verb, behind, span);
         }
         self.check_verb(&body, &verb, span);
-        if let Some(lights) = field(&fields, SpawnField::Lights)
+        if let Some(lights) = field(&fields, Field::Lights)
             && let Some(body) = possible(&body).into_iter().find(|body| !body.like.is_vehicle())
             && possible(&verb).contains(&Verb::Follow)
         {
@@ -260,14 +242,7 @@ impl Checker {
             of: None,
             trajectory: None,
             cover: None,
-            offset: as_written(offset)?,
-            ignores: ignores?,
-            meet: as_written(meet)?,
-            waits: as_written(waits)?,
-            early: as_written(early)?,
-            siren: as_written(siren)?,
-            turn: as_written(turn)?,
-            lights: as_written(lights)?,
+            told: told?,
             bearer: None,
             row: None,
             manoeuvre,
@@ -318,9 +293,9 @@ impl Checker {
     }
 
     /// Reports fields that mean nothing to a verb.
-    fn check_fields(&mut self, fields: &[(SpawnField, &ast::Expr)], verb: &WordExpr<Verb>) {
+    fn check_fields(&mut self, fields: &[(Field, &ast::Expr)], verb: &WordExpr<Verb>) {
         let verbs = possible(verb);
-        let reason = |field: SpawnField| {
+        let reason = |field: Field| {
             let mut reasons = IDLE_FIELDS.into_iter().filter(|idle| idle.field == field);
             reasons.find_map(|idle| Some((verbs.iter().find(|verb| (idle.is_idle)(**verb))?, idle)))
         };
@@ -329,8 +304,8 @@ impl Checker {
             let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, format!("`{}` {}", verb.name(), idle.what));
             self.report(error.at(value.span, "without effect").help(idle.help));
         }
-        let said = |wanted: SpawnField| field(fields, wanted).filter(|_| reason(wanted).is_none());
-        if let (Some(_), Some(waits)) = (said(SpawnField::Meet), said(SpawnField::Waits)) {
+        let said = |wanted: Field| field(fields, wanted).filter(|_| reason(wanted).is_none());
+        if let (Some(_), Some(waits)) = (said(Field::Meet), said(Field::Waits)) {
             let message = format!("`{}` sets out after a time or for a meeting", Verb::Walk.name());
             let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(waits.span, "both are said");
             self.report(error.help("leave `waits` or `meet` out"));
@@ -341,11 +316,11 @@ impl Checker {
     /// Reports a manoeuvre that tells somebody what it cannot be told: the first reason alone.
     fn check_given(&mut self, given: &ManoeuvreCall, verb: &WordExpr<Verb>, span: Span) {
         let has = |is_so: fn(&CommandDef) -> bool| self.has_command(given.manoeuvre, is_so);
-        let keeps = has(|command| command.keep.is_some());
-        let keeps_to_ego = has(|command| command.keep.is_some() && command.to.is_none());
-        let changes_lanes = has(|command| command.lane.is_some());
+        let keeps = has(|command| command.says(Field::Keep));
+        let keeps_to_ego = has(|command| command.says(Field::Keep) && !command.says(Field::To));
+        let changes_lanes = has(|command| command.says(Field::Lane));
         let goes_back = has(CommandDef::goes_back);
-        let meets_nowhere = has(|command| command.early.is_some() && command.reach.is_none());
+        let meets_nowhere = has(|command| command.says(Field::Early) && !command.says(Field::Reach));
         let told = self.told(given.manoeuvre);
         for verb in possible(verb) {
             let is_lacked = told.lacked_by(verb).is_some();
@@ -396,12 +371,10 @@ impl Checker {
     }
 
     /// Reports a `lane` and a `side` that mean nothing to any of the verbs.
-    fn check_place_fields(&mut self, fields: &[(SpawnField, &ast::Expr)], verbs: &[Verb]) {
+    fn check_place_fields(&mut self, fields: &[(Field, &ast::Expr)], verbs: &[Verb]) {
         let [ahead, behind, overtake] = [Verb::DriveAhead, Verb::DriveBehind, Verb::Overtake];
         let [cross, walk, stand] = [Verb::CrossRoad, Verb::Walk, Verb::Stand];
-        for (wanted, of) in
-            [(SpawnField::Lane, [ahead, behind, overtake]), (SpawnField::Side, [cross, walk, stand])]
-        {
+        for (wanted, of) in [(Field::Lane, [ahead, behind, overtake]), (Field::Side, [cross, walk, stand])] {
             let Some(value) = field(fields, wanted) else { continue };
             // Of a trajectory it is said elsewhere.
             let means_nothing = verbs.iter().all(|verb| !of.contains(verb) && *verb != Verb::Follow);

@@ -39,17 +39,8 @@ pub fn spawn_distance_m(verb: Verb) -> RangeInclusive<f64> {
 /// Places beside the middle of a lane, m to the left: two lanes and more, on either side.
 pub const OFFSET_M: RangeInclusive<f64> = -10.0..=10.0;
 
-/// Parts of the ego vehicle's front at which somebody may be met.
-pub const MEET: RangeInclusive<f64> = 0.0..=1.0;
-
-/// Times for which somebody may wait at the kerb, s.
-pub const WAITS_S: RangeInclusive<f64> = 0.0..=600.0;
-
 /// How far before the line of a light the ego vehicle may be as that changes, m.
 pub const LIGHT_AT_M: RangeInclusive<f64> = 0.0..=1000.0;
-
-/// How much before the ego vehicle a road user may be asked to be somewhere, s; below 0 after it.
-pub const EARLY_S: RangeInclusive<f64> = -30.0..=30.0;
 
 /// Offsets at which the cycle of the signals may begin, s.
 pub const SIGNAL_PHASE_S: RangeInclusive<f64> = 0.0..=3600.0;
@@ -76,34 +67,12 @@ pub fn rounded_into(figure: f64, bounds: RangeInclusive<f64>) -> f64 {
     }
 }
 
-/// The figures of a spawn.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct SpawnFigures {
-    pub verb: Option<Verb>,
-    pub speed_mps: f64,
-    pub distance_m: f64,
-    pub offset_m: f64,
-    pub meet: Option<f64>,
-    pub waits_s: Option<f64>,
-    pub early_s: Option<f64>,
-}
-
-impl SpawnFigures {
-    /// Why the world must not be asked for a spawn with them, whatever the rules say; `None` if it may. NaN is out of bounds,
-    /// too.
-    pub fn out_of_bounds(self) -> Option<String> {
-        let distance_range = self.verb.map_or(SPAWN_DISTANCE_M, spawn_distance_m);
-        let SpawnFigures { speed_mps, distance_m, offset_m, meet, waits_s, early_s, .. } = self;
-        let figures = [
-            Some(("speed", speed_mps, "m/s", SPAWN_SPEED_MPS)),
-            Some(("distance", distance_m, "m", distance_range)),
-            Some(("offset", offset_m, "m", OFFSET_M)),
-            meet.map(|part| ("meet", part, "", MEET)),
-            waits_s.map(|waits_s| ("wait", waits_s, "s", WAITS_S)),
-            early_s.map(|early_s| ("early", early_s, "s", EARLY_S)),
-        ];
-        out_of_bounds("spawn", figures.into_iter().flatten())
-    }
+/// Why the world must not be asked for a spawn at that speed and distance, whatever the rules say; `None` if it may. NaN is out of
+/// bounds, too.
+pub fn spawn_out_of_bounds(verb: Verb, speed_mps: f64, distance_m: f64) -> Option<String> {
+    let figures =
+        [("speed", speed_mps, "m/s", SPAWN_SPEED_MPS), ("distance", distance_m, "m", spawn_distance_m(verb))];
+    out_of_bounds("spawn", figures)
 }
 
 pub(super) fn out_of_bounds(
@@ -123,9 +92,7 @@ mod tests {
 
     #[test]
     fn no_spawn_lies_out_of_bounds() {
-        let out = |speed_mps, distance_m| {
-            SpawnFigures { speed_mps, distance_m, ..SpawnFigures::default() }.out_of_bounds()
-        };
+        let out = |speed_mps, distance_m| spawn_out_of_bounds(Verb::Overtake, speed_mps, distance_m);
         for (speed_mps, distance_m) in [(0.0, 0.0), (70.0, 1000.0)] {
             assert_eq!(out(speed_mps, distance_m), None);
         }

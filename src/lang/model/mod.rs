@@ -14,6 +14,7 @@ mod eval;
 pub mod expr;
 mod fact;
 mod facts;
+pub mod field;
 mod interval;
 mod limits;
 mod meaning;
@@ -42,9 +43,9 @@ pub use facts::{
 };
 pub use interval::{End, Interval};
 pub use limits::{
-    AMBIENT_MAX, COMMANDED_MAX, EARLY_S, EGO_ACCELERATION_MPS2_MAX, LIGHT_AT_M, LIMIT_PART_MAX, MEET,
-    OFFSET_M, REPEAT, SIGNAL_PHASE_S, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS,
-    SpawnFigures, TICK_MS, WAITS_S, rounded_into, spawn_distance_m,
+    AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, LIGHT_AT_M, LIMIT_PART_MAX, OFFSET_M, REPEAT,
+    SIGNAL_PHASE_S, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, TICK_MS, rounded_into,
+    spawn_distance_m, spawn_out_of_bounds,
 };
 pub use meaning::Meaning;
 pub(crate) use on_route::stretches;

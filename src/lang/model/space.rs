@@ -9,14 +9,14 @@ use crate::model::command::{CommandDef, Moves, Told};
 use crate::model::eval::evaluate;
 use crate::model::expr::{Expr, ExprKind, FnDef, Who, WordExpr};
 use crate::model::facts::{Facts, RoadFacts};
+use crate::model::field::{Fields, Term};
 use crate::model::interval::Interval;
 use crate::model::meaning::Meaning;
 use crate::model::rules::{Bound, Clause};
 use crate::model::trajectory::{Laid, TrajectoryDef};
 use crate::model::value::{EnumIndex, Type, Value};
 use crate::model::vocabulary::{
-    Body, Colour, LaneChoice, Level, LightColour, Phenomenon, ShownLights, Side, Then, TimeOfDay,
-    TrafficRule, Turning, Verb, Word,
+    Body, Colour, Field, LaneChoice, Level, LightColour, Phenomenon, Side, Then, TimeOfDay, Verb, Word,
 };
 use crate::syntax::ast::Span;
 use avastra_base::units::{
@@ -357,20 +357,8 @@ pub struct SpawnDef {
     pub trajectory: Option<WordExpr<usize>>,
     /// The parked vehicle from behind which a pedestrian steps.
     pub cover: Option<WordExpr<BodyWord>>,
-    /// m to the left of the middle of its lane.
-    pub offset: Option<Expr>,
-    pub ignores: Vec<WordExpr<TrafficRule>>,
-    /// The part of the ego vehicle's front at which it is met, from the side that it comes from.
-    pub meet: Option<Expr>,
-    /// How long it stands at the kerb, s; without it it sets out so as to meet the ego vehicle.
-    pub waits: Option<Expr>,
-    /// How much before the ego vehicle it is where it crosses its way, s, if that one keeps its speed; without it when a driver
-    /// like that of the route's limits arrives there.
-    pub early: Option<Expr>,
-    /// Whether it is an emergency vehicle under way.
-    pub siren: Option<Expr>,
-    pub turn: Option<WordExpr<Turning>>,
-    pub lights: Option<WordExpr<ShownLights>>,
+    /// What else it is told.
+    pub told: Fields<Term>,
     /// The name that it bears from then on, by index in `Space::bearers`.
     pub bearer: Option<usize>,
     /// Its place in a row of road users; `None` for one that is alone or the first.
@@ -443,7 +431,7 @@ impl PhaseDef {
     /// Whether it comes, and goes on until something else is told.
     pub fn never_ends(&self) -> bool {
         let is_true = |expr: &Expr| matches!(expr.kind, ExprKind::Bool(true));
-        self.only_if.is_none() && self.command.continuous.as_ref().is_some_and(is_true)
+        self.only_if.is_none() && self.command.expr(Field::Continuous).is_some_and(is_true)
     }
 }
 
@@ -656,7 +644,7 @@ impl Space {
     pub fn about(&self, row: &Row) -> Vec<usize> {
         let action = &self.actions[row.action];
         let named = action.effects.iter().flat_map(|effect| match effect {
-            EffectDef::Order(order) => [Some(order.who), order.command.to],
+            EffectDef::Order(order) => [Some(order.who), order.command.to()],
             EffectDef::Spawn(spawn) => [spawn.of, None],
             EffectDef::Set(_) | EffectDef::Light(_) => [None, None],
         });

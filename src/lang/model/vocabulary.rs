@@ -364,44 +364,31 @@ words! {
 }
 
 words! {
-    SpawnField "A field of `spawn`.":
+    Field "A field of `spawn`, of `order`, and of a phase of a manoeuvre.":
     Does "does" = "What the road user does: a verb of the engine.",
-    Lane "lane" = "Its lane, seen from the ego vehicle: `Left`, `Current` or `Right`.",
     Side "side" = "The side that it comes from: `Left` or `Right`.",
-    Then "then" = "Whether it keeps its lane or changes it: `Keep` or `Change`.",
-    Speed "speed" = "How fast it is.",
-    Offset "offset" = "How far to the left of its lane's middle it is; negative to the right.",
     Count "count" = "How many of a row appear, from the first name on: `count: 2`.",
-    Ignores "ignores" = "The rules of the road that it ignores: `ignores: [Signals]`.",
-    Siren "siren" = "Whether it is an emergency vehicle under way, for which all others wait: `siren: true`.",
-    Lights "lights" = "The lights that a vehicle shows: `Hazard`, `Left`, `Right`, `Flash` or `Off`.",
-    Turn "turn" = "Where it goes at the next junction: `Left`, `Straight` or `Right`.",
-    Early "early" = "How much before the ego vehicle it is where the two ways cross, if that one keeps its speed: `early: 0.5 s`.",
-    Waits "waits" = "How long it stands at the kerb before it sets out: `waits: 2 s`.",
-    Meet "meet" = "The part of the ego vehicle's front at which it is met, from the side that it comes from: `meet: 25 %`.",
-    Colour "colour" = "Its paint.",
-}
-
-words! {
-    CommandField "A field of `order` and of a phase of a manoeuvre.":
-    Speed "speed" = "The speed that the road user goes over to.",
+    Speed "speed" = "How fast it is; in an order, the speed that it goes over to.",
     Rate "rate" = "How fast it gains or loses speed for that, as far as its body and the road allow.",
     Continuous "continuous" = "Whether the `speed` of a phase is asked anew at every tick, until another one is told: `continuous: true`.",
-    Lane "lane" = "The lane that it changes to, seen from the ego vehicle: `Left`, `Current` or `Right`.",
-    Offset "offset" = "How far to the left of its lane's middle it drives from then on; negative to the right.",
+    Lane "lane" = "Its lane, seen from the ego vehicle: `Left`, `Current` or `Right`; in an order, the lane that it changes to.",
+    Offset "offset" = "How far to the left of its lane's middle it is, or goes; negative to the right.",
     Aside "aside" = "Its greatest speed to the side on the way there, or how long the move takes, as far as the road allows: `aside: 1.5 m/s`, `aside: 3 s`.",
     TimeGap "time_gap" = "The time gap that its driver keeps behind whoever is ahead of it.",
     Keep "keep" = "The gap that it keeps to the ego vehicle, ahead of it or behind it: `keep: 1.5 s`, `keep: 20 m`.",
     To "to" = "The road user to which it keeps that gap, in place of the ego vehicle: `keep: 20 m, to: truck`.",
-    Early "early" = "How much before the ego vehicle it is where the two ways cross, or `at` a station: `early: 1 s`.",
+    Early "early" = "How much before the ego vehicle it is where the two ways cross, or `at` a station, if that one keeps its speed: `early: 0.5 s`.",
     At "at" = "The station of the ego vehicle's route at which it is `early`: `at: van.rear`.",
     Reach "reach" = "Where on its own trajectory it is `early`, for who does `Follow`: `reach: 30 m`.",
     Steady "steady" = "For how long a way before that place it has its `speed` already: `steady: 10 m`.",
-    Ignores "ignores" = "The rules of the road that it ignores from then on: `ignores: [Signals]`; `[]` for none.",
-    Siren "siren" = "Whether it is an emergency vehicle under way from then on: `siren: false`.",
-    Lights "lights" = "The lights that it shows from then on: `Hazard`, `Left`, `Right`, `Flash` or `Off`.",
+    Waits "waits" = "How long it stands at the kerb before it sets out: `waits: 2 s`.",
+    Meet "meet" = "The part of the ego vehicle's front at which it is met, from the side that it comes from: `meet: 25 %`.",
+    Ignores "ignores" = "The rules of the road that it ignores: `ignores: [Signals]`; `[]` for none.",
+    Siren "siren" = "Whether it is an emergency vehicle under way, for which all others wait: `siren: true`.",
+    Lights "lights" = "The lights that it shows: `Hazard`, `Left`, `Right`, `Flash` or `Off`.",
     Turn "turn" = "Where it goes at the next junction: `Left`, `Straight` or `Right`.",
-    Then "then" = "The manoeuvre that it does from then on: `then: brake(4 m/s^2)`.",
+    Then "then" = "Whether it keeps its lane or changes it, `Keep` or `Change`, or the manoeuvre that it does: `then: brake(4 m/s^2)`.",
+    Colour "colour" = "Its paint.",
 }
 
 words! {

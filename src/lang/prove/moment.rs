@@ -10,7 +10,7 @@ use core::ops::RangeInclusive;
 
 use crate::model::expr::{Comparison, Expr, ExprKind};
 use crate::model::rules::RowRules;
-use crate::model::vocabulary::{Fact, Known as From, Light, RoadKind, Verb, Word, WordFact};
+use crate::model::vocabulary::{Fact, Field, Known as From, Light, RoadKind, Verb, Word, WordFact};
 use crate::model::{
     ActionDef, End, EpisodeDef, Interval, LIMIT_PART_MAX, NEAR_JUNCTION_M, RoadFacts, Row, RuleBody,
     RulesInForce, SPAWN_SPEED_MPS, SPEED_MPS_MAX, Space, SpawnDef, Stretch, Type, WordExpr, code, effort,
@@ -172,7 +172,7 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
     if lands
         && spawn.row.is_none()
         && spawn.of.is_none()
-        && spawn.offset.is_none()
+        && !spawn.told.says(Field::Offset)
         && is_ahead
         && verbs.iter().all(is_on_route)
         && !distance.is_empty()

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use crate::model::effort;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{self, Bound, Demand, RowRules, allowed, rules_by_action};
-use crate::model::vocabulary::Word;
+use crate::model::vocabulary::{Field, Word};
 use crate::model::{
     ActionDef, Domain, Facts, Interval, Memory, Parameter, Reach, Road, Row, RuleBody, RulesInForce, Space,
     Type, Value, code, evaluate, locals,
@@ -132,7 +132,8 @@ fn deciding_axes(space: &Space, action: usize) -> Vec<usize> {
     let of_spawns = definition.spawns().flat_map(|spawn| {
         let verb = spawn.verb.expr();
         let count = spawn.row.as_ref().and_then(|row| row.count.as_ref());
-        let exprs = [&spawn.speed, &spawn.distance].into_iter().chain(&spawn.offset).chain(verb).chain(count);
+        let offset = spawn.told.expr(Field::Offset);
+        let exprs = [&spawn.speed, &spawn.distance].into_iter().chain(offset).chain(verb).chain(count);
         exprs.flat_map(rules::locals)
     });
     let of_spawns: Vec<usize> = of_spawns.collect();

@@ -3,12 +3,12 @@
 use core::ops::RangeInclusive;
 use std::collections::BTreeSet;
 
-use crate::model::OFFSET_M;
 use crate::model::expr::ExprKind;
-use crate::model::vocabulary::{CommandField, Word};
+use crate::model::field::WrittenFigure;
+use crate::model::vocabulary::{Field, Word};
 use crate::model::{
-    ACTION_ODDS_MAX, EARLY_S, Interval, LIGHT_AT_M, MEET, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, Type,
-    WAITS_S, WordExpr, code, effort, spawn_distance_m,
+    ACTION_ODDS_MAX, Interval, LIGHT_AT_M, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, Type, WordExpr, code,
+    effort, spawn_distance_m,
 };
 use crate::prove::enclose::{Known, enclose};
 use crate::prove::reach::spawn_figures;
@@ -70,10 +70,6 @@ fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
         [
             Some(("speed", "a spawn", "m/s", &spawn.speed, SPAWN_SPEED_MPS)),
             Some(("distance", "a spawn", "m", &spawn.distance, distance_m)),
-            spawn.offset.as_ref().map(|offset| ("offset", "a spawn", "m", offset, OFFSET_M)),
-            spawn.meet.as_ref().map(|meet| ("meet", "a spawn", "", meet, MEET)),
-            spawn.waits.as_ref().map(|waits| ("wait", "a spawn", "s", waits, WAITS_S)),
-            spawn.early.as_ref().map(|early| ("early", "a spawn", "s", early, EARLY_S)),
             second().map(|row| ("gap", "a row", "m", &row.apart, SPAWN_DISTANCE_M)),
             second()
                 .and_then(|row| Some(("count", "a row", "", row.count.as_ref()?, 1.0..=row.named as f64))),
@@ -81,14 +77,19 @@ fn errors(space: &Space, action: usize) -> impl Iterator<Item = Diagnostic> {
     });
     let of_spawns = of_spawns.flatten();
     let of_orders = space.actions[action].orders().flat_map(|order| {
-        order.command.figures().map(|figure| {
-            let bounds = match figure.field {
-                CommandField::Speed => order.moves.speeds_mps(),
-                _ => figure.bounds,
+        order.command.figures().map(|WrittenFigure { field, expr, unit }| {
+            let bounds = match field {
+                Field::Speed => order.moves.speeds_mps(),
+                _ => unit.bounds,
             };
-            (figure.field.name(), "an order", figure.unit, figure.expr, bounds)
+            (field.name(), "an order", unit.name, expr, bounds)
         })
     });
+    let told = space.actions[action].spawns().flat_map(|spawn| spawn.told.figures());
+    let of_spawns =
+        of_spawns.chain(told.map(|WrittenFigure { field, expr, unit }| {
+            (field.name(), "a spawn", unit.name, expr, unit.bounds)
+        }));
     let of_lights = space.actions[action].light_orders();
     let of_lights =
         of_lights.filter_map(|light| Some(("at", "an order", "m", light.at.as_ref()?, LIGHT_AT_M)));

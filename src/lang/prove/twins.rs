@@ -6,9 +6,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::model::command::WrittenFigure;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::TrafficRule;
+use crate::model::field::{Fields, Term};
+use crate::model::vocabulary::Field;
 use crate::model::{
     Domain, EffectDef, ManoeuvreCall, Row, RuleBody, Space, SpawnDef, Value, WordExpr, code, effort,
 };
@@ -123,25 +123,9 @@ impl<'a> RowText<'a> {
                 format!("light {colour} {:?}", light.at.as_ref().map(|at| self.reduced(at).kind))
             }
             EffectDef::Order(order) => {
-                let figure = |figure: WrittenFigure<'_>| {
-                    format!("{:?} {:?}", figure.field, self.reduced(figure.expr).kind)
-                };
-                let figures: Vec<String> = order.command.figures().map(figure).collect();
-                let lane =
-                    order.command.lane.as_ref().map(|lane| word_form(lane, &|expr| self.reduced(expr)));
+                let told = told_form(&order.command, &self.locals, &|expr| self.reduced(expr));
                 let then = order.manoeuvre.as_ref().map(|then| self.call_form(then));
-                let siren = order.command.siren.as_ref().map(|siren| self.reduced(siren).kind);
-                let ignores = order.command.ignores.as_ref();
-                let ignores = ignores.map(|ignores| ignored_form(ignores, &|expr| self.reduced(expr)));
-                let turn =
-                    order.command.turn.as_ref().map(|turn| word_form(turn, &|expr| self.reduced(expr)));
-                let lights =
-                    order.command.lights.as_ref().map(|lights| word_form(lights, &|expr| self.reduced(expr)));
-                let to = order.command.to.map(|to| reduced_who(to, &self.locals));
-                format!(
-                    "order {:?} {figures:?} {to:?} {lane:?} {ignores:?} {siren:?} {turn:?} {lights:?} {then:?}",
-                    reduced_who(order.who, &self.locals)
-                )
+                format!("order {:?} {told} {then:?}", reduced_who(order.who, &self.locals))
             }
         });
         effects.collect::<Vec<_>>().join("\n")
@@ -188,14 +172,24 @@ fn word_form<W: Copy + core::fmt::Debug>(word: &WordExpr<W>, reduced: &impl Fn(&
     }
 }
 
-fn ignored_form(ignores: &[WordExpr<TrafficRule>], reduced: &impl Fn(&Expr) -> Expr) -> String {
-    let ignored: Vec<String> = ignores.iter().map(|manner| word_form(manner, reduced)).collect();
-    ignored.join(" ")
+fn told_form(told: &Fields<Term>, locals: &[Expr], reduced: &impl Fn(&Expr) -> Expr) -> String {
+    let form = |(field, term): (Field, &Term)| {
+        let value = match term {
+            Term::Figure { expr, .. } | Term::Truth(expr) => format!("{:?}", reduced(expr).kind),
+            Term::Word(word) => word_form(word, reduced),
+            Term::Rules(rules) => {
+                rules.iter().map(|rule| word_form(rule, reduced)).collect::<Vec<_>>().join(" ")
+            }
+            Term::Who(who) => format!("{:?}", reduced_who(*who, locals)),
+        };
+        format!("{field:?} {value}")
+    };
+    told.iter().map(form).collect::<Vec<_>>().join(", ")
 }
 
 fn spawn_form(spawn: &SpawnDef, locals: &[Expr], reduced: &impl Fn(&Expr) -> Expr) -> String {
     format!(
-        "spawn {} {} {} {} {} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {} {} {:?} {} {:?} {:?} {:?} {:?}",
+        "spawn {} {} {} {} {} {} {:?} {:?} {} {} {:?} {} {:?} {:?} {:?}",
         word_form(&spawn.body, reduced),
         word_form(&spawn.colour, reduced),
         word_form(&spawn.verb, reduced),
@@ -204,19 +198,12 @@ fn spawn_form(spawn: &SpawnDef, locals: &[Expr], reduced: &impl Fn(&Expr) -> Exp
         word_form(&spawn.then, reduced),
         reduced(&spawn.speed).kind,
         reduced(&spawn.distance).kind,
-        spawn.offset.as_ref().map(|offset| reduced(offset).kind),
-        spawn.meet.as_ref().map(|meet| reduced(meet).kind),
-        spawn.waits.as_ref().map(|waits| reduced(waits).kind),
-        spawn.siren.as_ref().map(|siren| reduced(siren).kind),
-        spawn.turn.as_ref().map(|turn| word_form(turn, reduced)),
-        spawn.lights.as_ref().map(|lights| word_form(lights, reduced)),
-        ignored_form(&spawn.ignores, reduced),
+        told_form(&spawn.told, locals, reduced),
         spawn.behind,
         spawn.of.map(|who| reduced_who(who, locals)),
         spawn.cover.as_ref().map_or(String::new(), |cover| word_form(cover, reduced)),
         spawn.trajectory.as_ref().map(|trajectory| word_form(trajectory, reduced)),
         spawn.bearer,
-        spawn.early.as_ref().map(|early| reduced(early).kind),
         spawn.row.as_ref().map(|row| {
             (row.nth, reduced(&row.apart).kind, row.count.as_ref().map(|count| reduced(count).kind))
         }),

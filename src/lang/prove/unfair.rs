@@ -5,7 +5,7 @@
 //! needs a lower bound. The world computes the whole distance (`spawn_gap >= safety_gap`).
 
 use crate::model::rules::{Demand, RowRules};
-use crate::model::vocabulary::{Known, LaneChoice, Verb, Word};
+use crate::model::vocabulary::{Field, Known, LaneChoice, Verb, Word};
 use crate::model::{
     Facts, Memory, Road, Row, RulesInForce, Space, SpawnDef, Value, code, effort, evaluate, locals,
 };
@@ -44,7 +44,7 @@ fn unfair(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef, left: &Left) 
     let in_force = RulesInForce::by_default(space);
     let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
     let asks = |demand| matches!(demand, Demand::Holds(condition) if condition.known() > Known::Road);
-    let is_elsewhere = spawn.offset.is_some() || spawn.of.is_some() || spawn.trajectory.is_some();
+    let is_elsewhere = spawn.told.says(Field::Offset) || spawn.of.is_some() || spawn.trajectory.is_some();
     if is_elsewhere || rules.demands().any(|(_, demand)| asks(demand)) {
         return None;
     }

@@ -16,10 +16,11 @@ use crate::model::OFFSET_M;
 use crate::model::body::parameters;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Before, Candidate, Choose, Demand, Nearest, Room, RowRules, cells_read};
+use crate::model::vocabulary::Field;
 use crate::model::{
     ActionDef, Domain, End, Facts, Interval, Memory, Parameter, Road, Row, RulesInForce, SPAWN_SPEED_MPS,
-    SetDef, Space, SpawnFacts, SpawnFigures, Type, Value, WorldFacts, effort, evaluate, locals, rounded_into,
-    spawn_distance_m,
+    SetDef, Space, SpawnFacts, Type, Value, WorldFacts, effort, evaluate, locals, rounded_into,
+    spawn_distance_m, spawn_out_of_bounds,
 };
 use crate::prove::enclose::{Known, Values};
 use crate::prove::lists::{distinct, product};
@@ -308,10 +309,11 @@ impl Search<'_> {
             let more_m = spawn.behind_first_m(shape.length_m, &space.functions, &facts);
             let verb = spawn.verb.word(&space.functions, &facts);
             let distance_m = rounded_into(number(&spawn.distance) + more_m, spawn_distance_m(verb));
-            let offset_m = spawn.offset.as_ref().map_or(0.0, |offset| rounded_into(number(offset), OFFSET_M));
-            let figures =
-                SpawnFigures { verb: Some(verb), speed_mps, distance_m, offset_m, ..SpawnFigures::default() };
-            if figures.out_of_bounds().is_some() {
+            let offset_m =
+                spawn.told.expr(Field::Offset).map(|offset| rounded_into(number(offset), OFFSET_M));
+            if spawn_out_of_bounds(verb, speed_mps, distance_m).is_some()
+                || offset_m.is_some_and(|offset_m| !OFFSET_M.contains(&offset_m))
+            {
                 return false;
             }
             // The spawn lands where it was asked to, and no gap is unfair. How far away somebody else is beside whom it is asked
@@ -424,11 +426,8 @@ impl Search<'_> {
         }
         for spawn in self.action().spawns() {
             let count = spawn.row.as_ref().and_then(|row| row.count.as_ref());
-            [&spawn.speed, &spawn.distance]
-                .into_iter()
-                .chain(&spawn.offset)
-                .chain(count)
-                .for_each(&mut named);
+            let offset = spawn.told.expr(Field::Offset);
+            [&spawn.speed, &spawn.distance].into_iter().chain(offset).chain(count).for_each(&mut named);
         }
         for (_, demand) in self.rules.demands() {
             match demand {

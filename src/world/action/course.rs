@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use avastra_lang::model::command::Command;
 use avastra_lang::model::expr::{Expr, Who};
-use avastra_lang::model::vocabulary::Known;
+use avastra_lang::model::vocabulary::{Field, Known};
 use avastra_lang::model::{ManoeuvreDef, PhaseDef, REPEAT, Value};
 
 use super::later::{Later, LaterMoment};
@@ -146,7 +146,7 @@ impl Course {
 
     /// The speed alone that a phase tells, m/s; `None` if it has no value.
     pub fn speed_mps(&self, phase: usize, moment: &LaterMoment) -> Option<f64> {
-        let speed = self.phase(phase).command.speed.as_ref()?;
+        let speed = self.phase(phase).command.expr(Field::Speed)?;
         Some(self.later.value(speed, moment).number()).filter(|mps| !mps.is_nan())
     }
 

@@ -12,18 +12,18 @@ use crate::action::{
 };
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
-use avastra_lang::model::OFFSET_M;
 use avastra_lang::model::body::{OwnBody, parameters};
-use avastra_lang::model::command::{Command, IgnoredRules, Told};
+use avastra_lang::model::command::Told;
 use avastra_lang::model::expr::{Expr, Who};
+use avastra_lang::model::field::Said;
 use avastra_lang::model::rules::{
     Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved,
 };
-use avastra_lang::model::vocabulary::{LaneChoice, ShownLights, Verb};
+use avastra_lang::model::vocabulary::{Field, LaneChoice, Verb};
 use avastra_lang::model::{
-    ActionDef, BodyWord, Domain, EARLY_S, EffectDef, Facts, LIGHT_AT_M, LightDef, MEET, ManoeuvreCall,
-    Memory, MomentFacts, NpcFacts, OrderDef, Parameter, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value,
-    WAITS_S, WorldFacts, evaluate, locals, reached, rounded_into, spawn_distance_m, told,
+    ActionDef, BodyWord, Domain, EffectDef, Facts, LIGHT_AT_M, LightDef, ManoeuvreCall, Memory, MomentFacts,
+    NpcFacts, OrderDef, Parameter, SPAWN_SPEED_MPS, Space, SpawnDef, Type, Value, WorldFacts, evaluate,
+    locals, reached, rounded_into, spawn_distance_m, told,
 };
 
 /// Draws of one row in a step before the row is refused. Every draw obeys what can be known before; a further one
@@ -194,7 +194,7 @@ impl<'a> Judge<'a> {
                 refusals.push(refuse(None, format!("cannot spawn: {why}")));
                 continue;
             }
-            if let Some(reason) = request.figures().out_of_bounds() {
+            if let Some(reason) = request.out_of_bounds() {
                 refusals.push(refuse(None, reason));
                 continue;
             }
@@ -370,9 +370,6 @@ impl<'a> Judge<'a> {
         let is_beside_route = |index: usize| self.row.space.trajectories[index].is_beside_route();
         let begins = trajectory.filter(|index| is_beside_route(*index));
         let begins = begins.map(|_| self.begins(spawn, asked_m, locals));
-        let figure = |expr: &Option<Expr>, bounds| {
-            expr.as_ref().map(|expr| rounded_into(evaluate(expr, functions, &facts).number(), bounds))
-        };
         let distance_m = |asked_m: f64| match spawn.of {
             _ if begins.is_some() => 0.0,
             None => rounded_into(asked_m, spawn_distance_m(verb)),
@@ -391,14 +388,7 @@ impl<'a> Judge<'a> {
             distance_m: distance_m(asked_m),
             first_m: (!is_first).then(|| distance_m(first_asked_m)),
             cover: cover.map(|cover| cover.like),
-            offset_m: figure(&spawn.offset, OFFSET_M).unwrap_or(0.0),
-            ignores: IgnoredRules::of(spawn.ignores.iter().map(|manner| manner.word(functions, &facts))),
-            meet: figure(&spawn.meet, MEET),
-            early_s: figure(&spawn.early, EARLY_S),
-            waits_s: figure(&spawn.waits, WAITS_S),
-            siren: spawn.siren.as_ref().is_some_and(|siren| evaluate(siren, functions, &facts).truth()),
-            turn: spawn.turn.as_ref().map(|turn| turn.word(functions, &facts)),
-            lights: spawn.lights.as_ref().map_or(ShownLights::Off, |lights| lights.word(functions, &facts)),
+            told: spawn.told.evaluate(functions, &facts),
             trajectory: trajectory.map(|index| OnTrajectory { index, begins }),
             behind_first_m,
             bearer: spawn.bearer,
@@ -434,10 +424,11 @@ impl<'a> Judge<'a> {
         };
         let is_there = |who: usize| self.bearers.iter().any(|(known, _)| *known == who);
         // Of the gap to somebody who appears with the order the world knows nothing yet.
-        let to = order.command.to.filter(|to| *to == order.bearer || spawned(*to).is_none());
+        let to = order.command.to().filter(|to| *to == order.bearer || spawned(*to).is_none());
         let impossible = || match (spawned(order.bearer), to) {
             (None, _) => {
-                let command = Command { to, ..order.command };
+                let mut command = order.command;
+                command.set(Field::To, to.map(Said::Who));
                 self.situation.surroundings.order_refusal(&OrderRequest { command, ..*order })
             }
             (Some(verb), to) => order.impossible(verb).or_else(|| match to? {
@@ -448,7 +439,7 @@ impl<'a> Judge<'a> {
         let name = || &self.row.space.bearers[order.bearer];
         let reason = order
             .command
-            .out_of_bounds()
+            .out_of_bounds("order")
             .or_else(|| Some(format!("cannot order `{}`: {}", name(), impossible()?)));
         reason.map(|reason| refuse(None, reason))
     }

@@ -1,19 +1,20 @@
 //! What a row does to the world once its parameters are drawn.
 
 use avastra_lang::model::body::OwnBody;
-use avastra_lang::model::command::{Command, IgnoredRules, Told};
+use avastra_lang::model::command::{Command, Told};
 use avastra_lang::model::expr::Expr;
+use avastra_lang::model::field::{Fields, IgnoredRules, Said};
 use avastra_lang::model::vocabulary::{
-    Body, Colour, LaneChoice, Level, LightColour, Phenomenon, ShownLights, Side, Then, TimeOfDay, Turning,
-    Verb,
+    Body, Colour, LaneChoice, Level, LightColour, Phenomenon, Side, Then, TimeOfDay, Verb,
 };
 use avastra_lang::model::{
-    Memory, MomentFacts, NpcFacts, Space, SpawnFacts, SpawnFigures, StateDef, StateMeaning,
+    Memory, MomentFacts, NpcFacts, Space, SpawnFacts, StateDef, StateMeaning, spawn_out_of_bounds,
 };
 
 use super::later::{Later, LaterMoment};
 
 /// One change of the world. A row has one or more, applied in order.
+#[expect(clippy::large_enum_variant, reason = "a draw has few effects, and requests are plain data")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Effect {
     Time(TimeOfDay),
@@ -75,23 +76,8 @@ pub struct SpawnRequest {
     pub cover_own: Option<OwnBody>,
     /// A vehicle that is parked with it, so that it steps out from behind; for `Walk` alone.
     pub cover: Option<Body>,
-    /// m to the left of the middle of its lane.
-    pub offset_m: f64,
-    /// The rules of the road that it ignores.
-    pub ignores: IgnoredRules,
-    /// The part of the ego vehicle's front at which it is met, from the side that it comes from; for `Walk` alone.
-    pub meet: Option<f64>,
-    /// How long it stands at the kerb before it sets out, s; for `Walk` alone. Without it it sets out so as to meet the ego
-    /// vehicle.
-    pub waits_s: Option<f64>,
-    /// How much before the ego vehicle it is where it crosses its way, s, if that one keeps its speed; for `CrossRoad` alone.
-    pub early_s: Option<f64>,
-    /// Whether it is an emergency vehicle under way.
-    pub siren: bool,
-    /// Where it goes at the next junction; with `CrossRoad` at the one where it crosses the ego vehicle's way.
-    pub turn: Option<Turning>,
-    /// What lights a vehicle shows.
-    pub lights: ShownLights,
+    /// What else it is told.
+    pub told: Fields<Said>,
     /// The trajectory that it follows; `distance_m` is then its station there.
     pub trajectory: Option<OnTrajectory>,
     /// How far it drives behind the first one of its row, m; for `CrossRoad`, where the distance is that of their meeting place.
@@ -121,9 +107,46 @@ pub enum Begins {
 }
 
 impl SpawnRequest {
-    pub fn figures(&self) -> SpawnFigures {
-        let SpawnRequest { verb, speed_mps, distance_m, offset_m, meet, waits_s, early_s, .. } = *self;
-        SpawnFigures { verb: Some(verb), speed_mps, distance_m, offset_m, meet, waits_s, early_s }
+    /// A sedan or a pedestrian that appears in the ego vehicle's lane, or from the right.
+    pub fn new(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
+        SpawnRequest {
+            body: if verb.is_on_foot() { Body::Pedestrian } else { Body::Sedan },
+            colour: Colour::Red,
+            verb,
+            lane: LaneChoice::Current,
+            side: Side::Right,
+            then: Then::Keep,
+            speed_mps,
+            distance_m,
+            own: None,
+            cover_own: None,
+            cover: None,
+            told: Fields::default(),
+            trajectory: None,
+            behind_first_m: 0.0,
+            first_m: None,
+            bearer: None,
+        }
+    }
+
+    /// m to the left of the middle of its lane.
+    pub fn offset_m(&self) -> f64 {
+        self.told.offset_m().unwrap_or(0.0)
+    }
+
+    /// The rules of the road that it ignores.
+    pub fn ignores(&self) -> IgnoredRules {
+        self.told.ignores().unwrap_or_default()
+    }
+
+    pub fn has_siren(&self) -> bool {
+        self.told.siren() == Some(true)
+    }
+
+    /// Why the world must not be asked for this, whatever the rules say; `None` if it may.
+    pub fn out_of_bounds(&self) -> Option<String> {
+        let placed = spawn_out_of_bounds(self.verb, self.speed_mps, self.distance_m);
+        placed.or_else(|| self.told.out_of_bounds("spawn"))
     }
 }
 

@@ -27,11 +27,11 @@ const ON_LINE_MPS: f64 = 0.1;
 impl Meeting {
     fn told(command: &Command) -> Option<Meeting> {
         Some(Meeting {
-            ego_m: command.at_m?,
-            early_s: command.early_s?,
-            reach_m: command.reach_m?,
-            mps: command.speed_mps,
-            steady_m: command.steady_m.unwrap_or(0.0),
+            ego_m: command.at_m()?,
+            early_s: command.early_s()?,
+            reach_m: command.reach_m()?,
+            mps: command.speed_mps(),
+            steady_m: command.steady_m().unwrap_or(0.0),
             stage: Stage::Adapting,
             ego_keeps: EgoKeeps::default(),
         })
@@ -143,12 +143,12 @@ impl Guided {
         if told.is_some() {
             self.late_s = None;
         }
-        self.meeting = told.or(self.meeting.filter(|_| command.speed_mps.is_none()));
-        if let Some(speed_mps) = command.speed_mps.filter(|_| command.early_s.is_none()) {
+        self.meeting = told.or(self.meeting.filter(|_| command.speed_mps().is_none()));
+        if let Some(speed_mps) = command.speed_mps().filter(|_| command.early_s().is_none()) {
             self.wants_mps = speed_mps;
-            self.rate_mps2 = command.rate_mps2.unwrap_or(f64::INFINITY);
+            self.rate_mps2 = command.rate_mps2().unwrap_or(f64::INFINITY);
         }
-        if let Some(to_m) = command.offset_m {
+        if let Some(to_m) = command.offset_m() {
             let by_m = (to_m - self.left_m).abs();
             let takes_s = command.aside().unwrap_or(AsideBy::Speed(ASIDE_MPS)).takes_s(by_m);
             let shift = Shift { from_m: self.left_m, to_m, takes_s, since_s: 0.0 };

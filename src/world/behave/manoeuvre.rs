@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use avastra_lang::model::command::{Command, Moves};
+use avastra_lang::model::vocabulary::Field;
 
 use crate::action::LaterMoment;
 use crate::state::manoeuvre::{Running, Stage, Tracked};
@@ -32,14 +33,14 @@ pub struct Progress {
 impl Progress {
     /// Whether it has done what a command says.
     pub fn meets(&self, command: &Command) -> bool {
-        let speed_mps = command.speed_mps.filter(|_| !command.pursues());
+        let speed_mps = command.speed_mps().filter(|_| !command.pursues());
         // Who stands as told moves no farther to the side.
         let stands = self.moves != Moves::Walks && speed_mps == Some(0.0) && self.speed_mps == 0.0;
-        !command.is_continuous
+        !command.is_continuous()
             && speed_mps.is_none_or(|mps| self.is_over || self.has_speed(mps))
             && (self.has_met || !command.pursues())
             && (self.is_aside || stands || !command.goes_aside())
-            && (self.has_turned || command.turn.is_none())
+            && (self.has_turned || command.turn().is_none())
     }
 
     /// Whether it has the speed that a phase wants, m/s. A stop is exact, and who follows a trajectory comes to every speed exactly.
@@ -68,8 +69,8 @@ impl Running {
     /// now.
     pub fn tracked(&self, moment: &LaterMoment, moves: Moves) -> Option<Command> {
         let Tracked { course, phase, first } = self.tracked.as_ref()?;
-        let speed_mps = Some(course.speed_mps(*phase, moment)?);
-        let now = Command { speed_mps, rate_mps2: first.rate_mps2, ..Command::default() };
+        let mut now = Command::default().with(Field::Speed, course.speed_mps(*phase, moment)?);
+        now.set(Field::Rate, first.get(Field::Rate).copied());
         Some(now.for_who(moves))
     }
 
@@ -118,10 +119,10 @@ impl Running {
                     };
                     begun += 1;
                     let command = command.for_who(progress.moves);
-                    if command.speed_mps.is_some() || command.pursues() {
+                    if command.speed_mps().is_some() || command.pursues() {
                         let course = Arc::clone(&self.course);
                         let tracked = Tracked { course, phase: self.phase, first: command };
-                        self.tracked = command.is_continuous.then_some(tracked);
+                        self.tracked = command.is_continuous().then_some(tracked);
                     }
                     if let Some(next) = self.course.next(self.phase, moment) {
                         let rest = Running { tracked: self.tracked, ..Running::new(Arc::new(next), tick) };

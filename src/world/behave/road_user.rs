@@ -67,7 +67,7 @@ impl Motion {
         match self {
             Motion::Drive(driver) => driver.order(command, to),
             Motion::Walk(walker) => {
-                command.speed_mps.iter().for_each(|speed_mps| walker.order(*speed_mps, tick));
+                command.speed_mps().iter().for_each(|speed_mps| walker.order(*speed_mps, tick));
             }
             Motion::Stroll(stroller) => stroller.order(command),
             Motion::Guide(guided) => guided.order(command),

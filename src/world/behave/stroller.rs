@@ -44,8 +44,8 @@ impl Stroller {
     }
 
     pub fn order(&mut self, command: &Command) {
-        self.speed_mps = command.speed_mps.unwrap_or(self.speed_mps);
-        if let Some(left_m) = command.offset_m {
+        self.speed_mps = command.speed_mps().unwrap_or(self.speed_mps);
+        if let Some(left_m) = command.offset_m() {
             self.aside_mps = match command.aside() {
                 None => ASIDE_MPS,
                 Some(AsideBy::Speed(mps)) => mps,

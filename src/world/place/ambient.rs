@@ -13,7 +13,7 @@ use avastra_base::geometry::OrientedBox;
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::body;
-use avastra_lang::model::command::IgnoredRules;
+use avastra_lang::model::field::IgnoredRules;
 use avastra_lang::model::vocabulary::{Body, BodyClass, Colour, Verb, Word};
 use avastra_road::is_apart;
 

@@ -46,18 +46,18 @@ pub fn commanded(
     station_m: f64,
     plan: Vec<PlannedChange>,
 ) -> Driver {
-    let SpawnRequest { speed_mps, turn, .. } = *asked.request;
-    let mut driver = Driver::new(asked.around.scene, way, station_m, Cruise::Commanded(speed_mps), plan);
-    turn.iter().for_each(|to| driver.mean_to_turn(*to, turns_in));
+    let cruise = Cruise::Commanded(asked.request.speed_mps);
+    let mut driver = Driver::new(asked.around.scene, way, station_m, cruise, plan);
+    asked.request.told.turn().iter().for_each(|to| driver.mean_to_turn(*to, turns_in));
     driver
 }
 
 /// The newcomer, if there is room for it.
 pub fn finish(asked: &Asked, motion: Motion, moved: Moved) -> Result<RoadUser, String> {
     let Asked { around, request, size, id, .. } = *asked;
-    let SpawnRequest { body, colour, verb, lights, .. } = *request;
+    let SpawnRequest { body, colour, verb, told, .. } = *request;
     let mut newcomer = RoadUser::new(around, id, body, colour, verb, Mover::new(size, motion), moved);
-    newcomer.obstacle.lights = lights;
+    newcomer.obstacle.lights = told.lights().unwrap_or(newcomer.obstacle.lights);
     let room_m = if verb == Verb::Follow { GUIDED_ROOM_M } else { ROOM_M };
     match newcomer.who_is_there(around, room_m) {
         None => Ok(newcomer),

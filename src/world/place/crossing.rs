@@ -38,7 +38,7 @@ pub fn cross_road(asked: &Asked) -> Result<Driver, String> {
         let from_right = conflict.angle_rad > 0.0;
         if !(request.distance_m..=request.distance_m + CROSSING_M).contains(&distance_m)
             || from_right != (request.side == Side::Right)
-            || request.turn.is_some_and(|to| !leads_through(&around.scene.map, conflict.lane, to))
+            || request.told.turn().is_some_and(|to| !leads_through(&around.scene.map, conflict.lane, to))
         {
             continue;
         }
@@ -49,7 +49,7 @@ pub fn cross_road(asked: &Asked) -> Result<Driver, String> {
             }
             continue;
         }
-        let arrival_s = match request.early_s {
+        let arrival_s = match request.told.early_s() {
             None => arrivals.after_s(around, distance_m),
             // Infinite while the ego vehicle stands.
             Some(early_s) => match distance_m / around.ego.speed_mps - early_s {
@@ -71,7 +71,7 @@ pub fn cross_road(asked: &Asked) -> Result<Driver, String> {
             Side::Left => "left",
             Side::Right => "right",
         };
-        let going = request.turn.map_or(String::new(), |to| format!(" that leads {}", in_words(to)));
+        let going = request.told.turn().map_or(String::new(), |to| format!(" that leads {}", in_words(to)));
         format!("no crossing leg from the {side}{going} within {CROSSING_M} m")
     }))
 }
@@ -79,7 +79,7 @@ pub fn cross_road(asked: &Asked) -> Result<Driver, String> {
 /// A driver that stands at the line before a junction, or where the junction begins, on a way through a conflict.
 fn standing(asked: &Asked, conflict: &Conflict) -> Result<Driver, String> {
     let Asked { around, request, size, id, .. } = *asked;
-    if request.early_s.is_some() {
+    if request.told.early_s().is_some() {
         return Err(
             "it stands at its line, so it does not come `early`: leave that out, or give it a speed".into()
         );
@@ -169,12 +169,12 @@ fn approach_m(asked: &Asked, way: &Way, meeting_m: f64, arrival_s: f64) -> Resul
     let mut left_s = arrival_s;
     let mut passed_lines: Vec<(usize, f64)> = Vec::new();
     // Signs and lights at which it stops.
-    let minds_signals = !request.siren && !request.ignores.contains(TrafficRule::Signals);
+    let minds_signals = !request.has_siren() && !request.ignores().contains(TrafficRule::Signals);
     let signs_m: &[f64] = if minds_signals { &way.stop_signs_m } else { &[] };
     let lines: &[StopLine] = if minds_signals { &way.stop_lines } else { &[] };
     while left_s > 1e-9 {
         // A driver looks from the middle of its vehicle. Who is to be there at no certain time was placed by its front before.
-        let from_m = if request.early_s.is_some() { front_m - size.length_m / 2.0 } else { front_m };
+        let from_m = if request.told.early_s().is_some() { front_m - size.length_m / 2.0 } else { front_m };
         let speed_mps = request.speed_mps.min(way.speed_mps_max(from_m)).max(0.1);
         let step_m = TIMING_M.min(speed_mps * left_s);
         front_m -= step_m;

@@ -166,9 +166,9 @@ fn way_of(
 ) -> Result<(Arc<Way>, Option<LaneIndex>), String> {
     let Asked { around, request, .. } = *asked;
     let keeps = request.then == Then::Keep;
-    let laid = Way::turning(&around.scene.roads, lanes, request.turn.filter(|_| keeps), rng);
+    let laid = Way::turning(&around.scene.roads, lanes, request.told.turn().filter(|_| keeps), rng);
     let (way, lane) = laid.ok_or("that lane leads nowhere")?;
-    match request.turn {
+    match request.told.turn() {
         Some(to) if keeps && lane.is_none() => {
             Err(format!("its lane does not lead {} at the next junction", in_words(to)))
         }

@@ -63,11 +63,11 @@ pub fn place(
         Verb::Follow => return on_trajectory(&asked),
     };
     let (lane, _) = driver.way.lane_at(driver.station_m);
-    if !may_use(around.scene, lane, request.body, request.ignores) {
+    if !may_use(around.scene, lane, request.body, request.ignores()) {
         return Err("that lane is for buses".into());
     }
-    driver.begin_at(request.offset_m, request.ignores);
-    driver.has_siren = request.siren;
+    driver.begin_at(request.offset_m(), request.ignores());
+    driver.has_siren = request.has_siren();
     check_way(around, &driver, &size)?;
     let moved = driver.moved(&size);
     Ok(Newcomers { asked: finish(&asked, Motion::Drive(driver), moved)?, cover: None })
@@ -101,7 +101,7 @@ fn on_trajectory(asked: &Asked) -> Result<Newcomers, String> {
         return Err("the trajectory ends before that station".into());
     }
     let to_middle_m = Guided::to_middle_m(request.body.is_vehicle(), size);
-    let guided = Guided::new(way, request.distance_m, request.offset_m, request.speed_mps, to_middle_m);
+    let guided = Guided::new(way, request.distance_m, request.offset_m(), request.speed_mps, to_middle_m);
     let begins = guided.begins();
     Ok(Newcomers { asked: finish(asked, Motion::Guide(guided), begins)?, cover: None })
 }
@@ -109,7 +109,7 @@ fn on_trajectory(asked: &Asked) -> Result<Newcomers, String> {
 /// Refuses what no road user could do. Requests of scripts come from outside, so nothing is taken for
 /// granted; NaN is in no range.
 fn check(request: &SpawnRequest) -> Result<(), String> {
-    if let Some(reason) = request.figures().out_of_bounds() {
+    if let Some(reason) = request.out_of_bounds() {
         return Err(reason);
     }
     if request.cover.is_some_and(|cover| !cover.is_vehicle() || request.verb != Verb::Walk) {
@@ -146,7 +146,7 @@ pub fn facts(around: &Around, request: &SpawnRequest, newcomers: &Newcomers) -> 
             let braking_mps2 = around.braking_mps2(&newcomer.mover.size, along_mps.max(0.0));
             from_behind_m(along_mps, ego_mps, braking_mps2)
         }
-        Verb::DriveOpposite if request.offset_m > 0.0 || meets_route(around, &newcomer.mover) => {
+        Verb::DriveOpposite if request.offset_m() > 0.0 || meets_route(around, &newcomer.mover) => {
             oncoming_m(ego_mps, -along_mps, friction)
         }
         // It is where its trajectory says, whatever the ego vehicle does.

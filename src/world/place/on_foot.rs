@@ -47,7 +47,7 @@ pub fn on_foot(asked: &Asked) -> Result<Newcomers, String> {
     }
     let asked_m = ahead_m(asked)?;
     if request.verb == Verb::Stand {
-        let lane = around.scene.route.path.pose_at(asked_m).offset(0.0, request.offset_m);
+        let lane = around.scene.route.path.pose_at(asked_m).offset(0.0, request.offset_m());
         // Who is on foot looks across the road; a thing lies along it.
         let turn_rad = match request.side {
             _ if request.body == Body::Object => 0.0,
@@ -59,7 +59,7 @@ pub fn on_foot(asked: &Asked) -> Result<Newcomers, String> {
     }
     if request.verb.walks_along() {
         let is_oncoming = request.verb == Verb::WalkOpposite;
-        let stroller = Stroller::new(asked_m, request.offset_m, is_oncoming, request.speed_mps, around);
+        let stroller = Stroller::new(asked_m, request.offset_m(), is_oncoming, request.speed_mps, around);
         let begins = stroller.begins(around);
         return Ok(Newcomers { asked: finish(asked, Motion::Stroll(stroller), begins)?, cover: None });
     }
@@ -120,7 +120,7 @@ fn walk(asked: &Asked, way: &Crossing) -> Result<RoadUser, String> {
         return Err("a parked vehicle stands in the way".into());
     }
     let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
-    let meeting = request.meet.map(|part| Meeting {
+    let meeting = request.told.meet().map(|part| Meeting {
         // The near side of its body.
         station_m: way.station_m - asked.size.width_m / 2.0,
         way_m: way.from.way_m + (part - 0.5) * VehicleParameters::MKZ.width_m,
@@ -131,7 +131,7 @@ fn walk(asked: &Asked, way: &Crossing) -> Result<RoadUser, String> {
     }
     let walk = Walk {
         meeting,
-        waits_s: request.waits_s,
+        waits_s: request.told.waits_s(),
         from,
         way_m,
         beyond_m: way.to.beyond_m,

@@ -1,6 +1,6 @@
 //! Which lane a request or a command means: the ego vehicle's, one beside it, or an oncoming one.
 
-use avastra_lang::model::command::IgnoredRules;
+use avastra_lang::model::field::IgnoredRules;
 use avastra_lang::model::vocabulary::{Body, LaneChoice, Side, TrafficRule};
 use avastra_road as road;
 use avastra_road::{LaneIndex, Neighbour, RouteLane, Turn};

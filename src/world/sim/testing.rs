@@ -5,10 +5,8 @@ use std::sync::Arc;
 use crate::action::SpawnRequest;
 use avastra_base::geometry::Vec2;
 use avastra_lang::model::START_MPS;
-use avastra_lang::model::command::IgnoredRules;
-use avastra_lang::model::vocabulary::{
-    Body, Colour, LaneChoice, Level, ShownLights, Side, Then, TimeOfDay, Verb,
-};
+use avastra_lang::model::field::Said;
+use avastra_lang::model::vocabulary::{Field, Level, TimeOfDay, Verb};
 use avastra_road::testing::{lanes, road, street};
 use avastra_road::{RoadMap, Route};
 
@@ -72,34 +70,13 @@ pub fn digest(world: &World) -> [u8; 32] {
     trace.digest()
 }
 
-/// A road user that appears in the ego vehicle's lane, or from the right: on foot if the verb is.
 pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
-    let on_foot = verb.is_on_foot();
-    SpawnRequest {
-        body: if on_foot { Body::Pedestrian } else { Body::Sedan },
-        colour: Colour::Red,
-        verb,
-        lane: LaneChoice::Current,
-        side: Side::Right,
-        then: Then::Keep,
-        speed_mps,
-        distance_m,
-        own: None,
-        cover_own: None,
-        cover: None,
-        offset_m: 0.0,
-        ignores: IgnoredRules::default(),
-        siren: false,
-        turn: None,
-        lights: ShownLights::Off,
-        meet: None,
-        waits_s: None,
-        early_s: None,
-        trajectory: None,
-        behind_first_m: 0.0,
-        first_m: None,
-        bearer: None,
-    }
+    SpawnRequest::new(verb, distance_m, speed_mps)
+}
+
+/// The same, told this as well.
+pub fn told(request: SpawnRequest, field: Field, said: impl Into<Said>) -> SpawnRequest {
+    SpawnRequest { told: request.told.with(field, said), ..request }
 }
 
 pub fn world(scene: &Arc<Scene>) -> World {

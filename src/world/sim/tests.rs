@@ -16,7 +16,9 @@ use super::{
 use crate::action::{Effect, SpawnRequest, Surroundings};
 use avastra_base::geometry::{Vec2, distance_m, wrap_angle};
 use avastra_lang::model::body::{Changes, OwnBody, parameters};
-use avastra_lang::model::vocabulary::{Body, LaneChoice, Level, Light, Phenomenon, Side, Then, Verb, Word};
+use avastra_lang::model::vocabulary::{
+    Body, Field, LaneChoice, Level, Light, Phenomenon, Side, Then, Verb, Word,
+};
 
 /// Holds a speed and the route, whatever is in the way, by aiming at a point ahead (pure pursuit).
 pub(crate) fn hold(world: &World, speed_mps: f64) -> Control {
@@ -297,10 +299,9 @@ fn a_wall_hides_who_is_behind_it_up_to_its_height() {
             ..Changes::default()
         };
         let shape = parameters(Body::Object).changed(&changes);
-        let stands = |body, distance_m, offset_m| SpawnRequest {
-            body,
-            offset_m,
-            ..request(Verb::Stand, distance_m, 0.0)
+        let stands = |body, distance_m, offset_m: f64| {
+            let stands = SpawnRequest { body, ..request(Verb::Stand, distance_m, 0.0) };
+            testing::told(stands, Field::Offset, offset_m)
         };
         let wall = stands(Body::Object, 40.0, -5.0);
         spawn(&mut world, SpawnRequest { own: Some(OwnBody { index: 0, shape }), ..wall });

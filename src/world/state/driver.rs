@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use avastra_base::geometry::{Chord, Pose, Vec2, unit_vector};
 use avastra_lang::model::body::BodyParameters;
-use avastra_lang::model::command::IgnoredRules;
+use avastra_lang::model::field::IgnoredRules;
 use avastra_lang::model::vocabulary::{Side, Turning};
 use avastra_road::LaneIndex;
 

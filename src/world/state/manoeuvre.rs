@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use avastra_lang::model::command::Command;
+use avastra_lang::model::vocabulary::Field;
 
 use crate::action::Course;
 use crate::state::trace::{Trace, Traced, traced};
@@ -53,6 +54,7 @@ pub struct Tracked {
     pub first: Command,
 }
 
+#[expect(clippy::large_enum_variant, reason = "few road users do a manoeuvre, and a command is plain data")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stage {
     /// Until what the phase waits for has held for long enough: the tick since which it has held.
@@ -68,14 +70,16 @@ pub enum Stage {
 traced! {
     Running { course, phase, stage, since, tracked };
     Tracked { course, phase, first };
-    // Only what later ticks read: the driver has the rest.
-    Command {
-        speed_mps, rate_mps2, turn => turn.is_some(),
-        lane => lane.is_some(), offset_m => offset_m.is_some(),
-        keep_m => keep_m.is_some(), keep_s => keep_s.is_some(), early_s => early_s.is_some()
-    } but {
-        is_continuous, aside_mps, aside_s, time_gap_s, to, at_m, reach_m, steady_m, ignores, siren, lights
-    };
+}
+
+impl Traced for Command {
+    /// Only what later ticks read: the driver has the rest.
+    fn trace(&self, trace: &mut Trace) {
+        (self.speed_mps(), self.rate_mps2()).trace(trace);
+        (self.says(Field::Turn), self.says(Field::Lane)).trace(trace);
+        (self.says(Field::Offset), self.keep_m().is_some()).trace(trace);
+        (self.keep_s().is_some(), self.says(Field::Early)).trace(trace);
+    }
 }
 
 impl Traced for Course {

@@ -38,12 +38,12 @@ pub enum Gap {
 
 impl Pursuit {
     pub fn told(command: &Command, to: Option<u32>) -> Option<Pursuit> {
-        let Command { speed_mps: speed_mps_max, keep_m, keep_s, early_s, at_m, .. } = *command;
-        let gap = keep_m.map(Gap::Way).or(keep_s.map(Gap::Time)).map(|gap| Aim::Gap(gap, to));
-        let place = early_s.map(|early_s| Aim::Place { early_s, station_m: at_m });
+        let gap = command.keep_m().map(Gap::Way).or(command.keep_s().map(Gap::Time));
+        let gap = gap.map(|gap| Aim::Gap(gap, to));
+        let place = command.early_s().map(|early_s| Aim::Place { early_s, station_m: command.at_m() });
         Some(Pursuit {
             aim: gap.or(place)?,
-            speed_mps_max,
+            speed_mps_max: command.speed_mps(),
             crosses_in: None,
             is_met: false,
             late_s: None,

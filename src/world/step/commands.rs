@@ -18,6 +18,7 @@ use crate::state::world::{Switch, World};
 use crate::view::around::View;
 use crate::view::moment::npc_facts;
 use avastra_lang::model::command::Command;
+use avastra_lang::model::vocabulary::Field;
 use avastra_lang::model::{COMMANDED_MAX, NpcFacts};
 use avastra_road::StopLine;
 
@@ -55,7 +56,7 @@ impl World {
             let mover = &mut self.users[index].mover;
             let course = draw.course(nth);
             let may_change = match effect {
-                Effect::Order(order) => order.command.lane.is_some() || course.is_some(),
+                Effect::Order(order) => order.command.lane().is_some() || course.is_some(),
                 Effect::Time(_) | Effect::Sky(..) | Effect::Spawn(_) | Effect::Light(_) => true,
             };
             if let Some(course) = course {
@@ -118,28 +119,32 @@ impl World {
         if let Some(reason) = order.impossible(obstacle.verb) {
             return Err(reason);
         }
-        match order.command.to.map(|who| self.bearer_id(who)) {
+        match order.command.to().map(|who| self.bearer_id(who)) {
             Some(None) => return Err(GAP_TO_NOBODY.to_owned()),
             Some(Some(id)) if id == obstacle.id => return Err(GAP_TO_ITSELF.to_owned()),
             Some(Some(_)) | None => {}
         }
         if let Motion::Drive(driver) = &mover.motion {
             let (around, command) = (self.alone(), &order.command);
-            let ignores = command.ignores.unwrap_or(driver.ignores);
+            let ignores = command.ignores().unwrap_or(driver.ignores);
             let side =
-                command.lane.map(|lane| driver.side_of(lane, obstacle, ignores, &around)).transpose()?;
+                command.lane().map(|lane| driver.side_of(lane, obstacle, ignores, &around)).transpose()?;
             // One that is to change its lane will turn from another one.
-            if let (Some(to), None) = (command.turn, side.flatten()) {
+            if let (Some(to), None) = (command.turn(), side.flatten()) {
                 driver.can_turn(to, &around, &mover.size)?;
             }
             let view = View { this: obstacle, size: &mover.size, around: &around };
-            if command.early_s.is_some() && command.at_m.is_some_and(|at_m| driver.is_past(&view, at_m)) {
+            if command.early_s().is_some() && command.at_m().is_some_and(|at_m| driver.is_past(&view, at_m)) {
                 return Err("it is past that place already".to_owned());
             }
             let crosses = || {
                 driver.ways_to_crossing(mover.size.length_m, &around).is_some_and(|(_, ego_m)| ego_m > 0.0)
             };
-            if command.early_s.is_some() && command.at_m.is_none() && command.turn.is_none() && !crosses() {
+            if command.early_s().is_some()
+                && command.at_m().is_none()
+                && command.turn().is_none()
+                && !crosses()
+            {
                 return Err("its way does not cross the ego vehicle's ahead of it".to_owned());
             }
         }
@@ -148,7 +153,7 @@ impl World {
 
     fn order(&mut self, order: &OrderRequest) -> Result<(), String> {
         let index = self.ordered(order)?;
-        let to = order.command.to.and_then(|who| self.bearer_id(who));
+        let to = order.command.to().and_then(|who| self.bearer_id(who));
         let mover = &mut self.users[index].mover;
         // The phases that are left of a manoeuvre are dropped.
         mover.course = None;
@@ -204,7 +209,7 @@ impl World {
     /// A vehicle shows the lights that it is told to.
     fn show(&mut self, index: usize, command: &Command) {
         let lights = &mut self.users[index].obstacle.lights;
-        *lights = command.lights.unwrap_or(*lights);
+        *lights = command.lights().unwrap_or(*lights);
     }
 
     /// Moves on the manoeuvres of road users, whose phases tell them what to do.
@@ -241,15 +246,18 @@ impl World {
             let tracked = rest.as_ref().and_then(|rest| rest.tracked(&moment, progress.moves));
             // What a phase tells now may leave the speed to one before it.
             let command = match (command, tracked) {
-                (Some(command), Some(tracked)) if command.speed_mps.is_none() => {
-                    Some(Command { speed_mps: tracked.speed_mps, rate_mps2: tracked.rate_mps2, ..command })
+                (Some(mut command), Some(tracked)) if !command.says(Field::Speed) => {
+                    for field in [Field::Speed, Field::Rate] {
+                        command.set(field, tracked.get(field).copied());
+                    }
+                    Some(command)
                 }
                 (command, tracked) => command.or(tracked),
             };
             mover.course = rest;
             let Some(command) = command else { continue };
             let to =
-                command.to.map(|who| self.bearer_id(who).filter(|id| *id != self.users[index].obstacle.id));
+                command.to().map(|who| self.bearer_id(who).filter(|id| *id != self.users[index].obstacle.id));
             let mover = &mut self.users[index].mover;
             match to {
                 // Without somebody to whom the gap would be kept that has no value.

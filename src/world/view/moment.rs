@@ -523,10 +523,11 @@ mod tests {
 
     #[test]
     fn who_crosses_is_in_the_junction_and_says_where_it_goes() {
-        use crate::action::{Effect, SpawnRequest};
+        use crate::action::Effect;
+        use avastra_lang::model::vocabulary::Field;
         let mut world = testing::world(&testing::four_arms());
         let request = testing::request(Verb::CrossRoad, 60.0, 6.0);
-        world.apply(&Effect::Spawn(SpawnRequest { siren: true, ..request })).expect("there is room");
+        world.apply(&Effect::Spawn(testing::told(request, Field::Siren, true))).expect("there is room");
         let mut inside = 0;
         for _ in 0..1500 {
             world.tick(&Control { brake_pct: 100.0, ..Control::default() });

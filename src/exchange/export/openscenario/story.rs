@@ -10,7 +10,7 @@ use avastra_base::geometry::{Path, PathPoint, Pose, wrap_angle};
 use avastra_campaign::episode::Actor;
 use avastra_lang::model::command::{AsideBy, Command};
 use avastra_lang::model::expr::Expr;
-use avastra_lang::model::vocabulary::Verb;
+use avastra_lang::model::vocabulary::{Field, Verb};
 use avastra_lang::model::{Laid, NpcFacts, Road, Trajectory};
 use avastra_road::{Lane, LaneIndex, LanePlace, RoadMap};
 use avastra_world::action::{Course, LaterMoment, SpawnRequest};
@@ -110,7 +110,7 @@ impl<'a> Cast<'a> {
                 match lanes {
                     Some((begin, places)) => Ok(Way::Lanes(trajectory, begin, places)),
                     // Beside a bend the stations are not those of the way that is driven.
-                    None if request.offset_m != 0.0 && is_bent(&trajectory.path) => {
+                    None if request.offset_m() != 0.0 && is_bent(&trajectory.path) => {
                         does("goes beside a way that bends")
                     }
                     None => Ok(Way::Free(trajectory)),
@@ -128,7 +128,7 @@ impl<'a> Cast<'a> {
             Way::Stands => private.holding(teleport(position(&pose))).holding(speed(0.0)),
             Way::Lanes(_, begin, places) => {
                 let map = &self.road.map;
-                let at = LanePlace { offset_m: request.offset_m, ..*begin };
+                let at = LanePlace { offset_m: request.offset_m(), ..*begin };
                 let begins =
                     private.holding(teleport(lane_position_aside(map, at))).holding(speed(request.speed_mps));
                 let forks = |place: &LanePlace| map.lane(place.lane).successors.len() > 1;
@@ -141,7 +141,7 @@ impl<'a> Cast<'a> {
                 }
             }
             Way::Free(trajectory) => {
-                let vertex = |at_m: f64| trajectory.path.pose_at(at_m).offset(0.0, request.offset_m);
+                let vertex = |at_m: f64| trajectory.path.pose_at(at_m).offset(0.0, request.offset_m());
                 let points = trajectory.path.points();
                 // Two beside a bend are one in the file.
                 let next_m = |nth: usize| points.get(nth + 1).map_or(f64::INFINITY, |next| next.station_m);
@@ -160,7 +160,7 @@ impl<'a> Cast<'a> {
     fn events(&self, nth: usize, way: &Way<'a>) -> Result<Vec<Element>, String> {
         let newcomer = &self.newcomers[nth];
         let mut events: Vec<Element> = Vec::new();
-        let mut offset_m = newcomer.request.offset_m;
+        let mut offset_m = newcomer.request.offset_m();
         let mut most_mps = newcomer.request.speed_mps;
         let phases =
             newcomer.course.iter().flat_map(|course| (0..course.phases()).map(move |at| (course, at)));
@@ -169,8 +169,9 @@ impl<'a> Cast<'a> {
                 return Err("rules say when a phase may begin".to_owned());
             }
             // Who arrives somewhere in time may be fast on the way.
-            let is_timed = course.phase(at).command.early.is_some();
-            let speed_mps = course.phase(at).command.speed.as_ref().and_then(|speed| course.constant(speed));
+            let is_timed = course.phase(at).command.says(Field::Early);
+            let speed_mps =
+                course.phase(at).command.expr(Field::Speed).and_then(|speed| course.constant(speed));
             let told_mps = speed_mps.map_or(0.0, |value| value.number());
             most_mps = most_mps.max(if is_timed { f64::INFINITY } else { told_mps });
             let name = event_name(newcomer, at);
@@ -282,18 +283,18 @@ impl<'a> Cast<'a> {
             return Err("a phase tells what has no value".to_owned());
         };
         let mut actions = Vec::new();
-        match (command.early_s, command.speed_mps) {
+        match (command.early_s(), command.speed_mps()) {
             (Some(_), _) => actions.push(self.meets(newcomer, way, &command)?),
             (None, Some(mps)) if mps < 0.0 => return Err("somebody goes backwards".to_owned()),
-            (None, Some(mps)) => actions.push(changes_speed(mps, command.rate_mps2)),
+            (None, Some(mps)) => actions.push(changes_speed(mps, command.rate_mps2())),
             (None, None) => {}
         }
-        if let Some(to_m) = command.offset_m {
+        if let Some(to_m) = command.offset_m() {
             let Way::Lanes(_, begin, _) = way else {
                 return Err("somebody moves to the side of a way of its own".to_owned());
             };
             let is_cut_short = |before: usize| {
-                course.phase(before).command.offset.is_some()
+                course.phase(before).command.says(Field::Offset)
                     && (before + 1..=at).any(|later| course.phase(later).once.is_some())
             };
             if (0..at).any(is_cut_short) {
@@ -312,7 +313,8 @@ impl<'a> Cast<'a> {
 
     /// To be somewhere when the ego vehicle is at a place of its route.
     fn meets(&self, newcomer: &Newcomer, way: &Way<'a>, command: &Command) -> Result<Element, String> {
-        let (Some(at_m), Some(reach_m), Some(0.0)) = (command.at_m, command.reach_m, command.early_s) else {
+        let (Some(at_m), Some(reach_m), Some(0.0)) = (command.at_m(), command.reach_m(), command.early_s())
+        else {
             return Err("somebody arrives earlier or later than the ego vehicle, or where their ways cross"
                 .to_owned());
         };
@@ -330,13 +332,13 @@ impl<'a> Cast<'a> {
                 lane_position(&self.road.map, LanePlace { station_m: near(place).station_m, ..*place })
             }
             Way::Free(trajectory) => {
-                position(&trajectory.path.pose_at(reach_m).offset(0.0, newcomer.request.offset_m))
+                position(&trajectory.path.pose_at(reach_m).offset(0.0, newcomer.request.offset_m()))
             }
             Way::Stands => return Err("somebody arrives who stands".to_owned()),
         };
-        let speed = command.speed_mps.map(|mps| {
+        let speed = command.speed_mps().map(|mps| {
             let steady = command
-                .steady_m
+                .steady_m()
                 .filter(|steady_m| *steady_m > 0.0)
                 .map(|steady_m| Element::new("TargetDistanceSteadyState").measured("distance", steady_m));
             let speed = Element::new("AbsoluteSpeed").measured("value", mps).holding_all(steady);

@@ -3,7 +3,8 @@
 //! at once and asks nobody.
 
 use avastra_base::geometry::{Pose, SmoothStep, smooth_step};
-use avastra_lang::model::command::{AsideBy, Command, IgnoredRules};
+use avastra_lang::model::command::{AsideBy, Command};
+use avastra_lang::model::field::IgnoredRules;
 use avastra_lang::model::vocabulary::{LaneChoice, Side};
 use avastra_road::LaneIndex;
 
@@ -24,23 +25,23 @@ impl Driver {
     pub fn order(&mut self, command: &Command, to: Option<u32>) {
         if let Some(pursuit) = Pursuit::told(command, to) {
             self.late_s = None;
-            (self.pursuit, self.ordered_mps2) = (Some(Box::new(pursuit)), command.rate_mps2);
-        } else if let Some(speed_mps) = command.speed_mps {
-            (self.cruise_mps, self.ordered_mps2) = (speed_mps, command.rate_mps2);
+            (self.pursuit, self.ordered_mps2) = (Some(Box::new(pursuit)), command.rate_mps2());
+        } else if let Some(speed_mps) = command.speed_mps() {
+            (self.cruise_mps, self.ordered_mps2) = (speed_mps, command.rate_mps2());
             self.pursuit = None;
         }
-        self.time_gap_s = command.time_gap_s.unwrap_or(self.time_gap_s);
-        self.ignores = command.ignores.unwrap_or(self.ignores);
-        self.has_siren = command.siren.unwrap_or(self.has_siren);
-        command.turn.iter().for_each(|to| self.mean_to_turn(*to, None));
+        self.time_gap_s = command.time_gap_s().unwrap_or(self.time_gap_s);
+        self.ignores = command.ignores().unwrap_or(self.ignores);
+        self.has_siren = command.siren().unwrap_or(self.has_siren);
+        command.turn().iter().for_each(|to| self.mean_to_turn(*to, None));
         if command.goes_aside() {
             self.plan.clear();
             let aside = self.aside.get_or_insert_default();
             let begun_m = self.change.as_ref().map_or(aside.now_m, |change| change.ends_m);
             let heads_for_m = aside.shift.map_or(begun_m, |shift| shift.to_m);
-            aside.wanted_m = command.offset_m.unwrap_or(heads_for_m);
-            (aside.lane, aside.told) = (command.lane, command.aside());
-            aside.was_told_midway = command.lane.is_some() && self.change.is_some();
+            aside.wanted_m = command.offset_m().unwrap_or(heads_for_m);
+            (aside.lane, aside.told) = (command.lane(), command.aside());
+            aside.was_told_midway = command.lane().is_some() && self.change.is_some();
         }
     }
 

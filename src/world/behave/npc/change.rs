@@ -323,7 +323,7 @@ pub fn can_change(around: &Around, way: &Way, station_m: f64, side: Side, reques
     let ahead = way.lanes_from(station_m).skip_while(|(lane, _)| in_junction(*lane));
     ahead.take_while(|(lane, _)| !in_junction(*lane)).any(|(lane, at_m)| {
         let Some(target) = lane_beside(around.scene, lane, side) else { return false };
-        if !may_use(around.scene, target, request.body, request.ignores) {
+        if !may_use(around.scene, target, request.body, request.ignores()) {
             return false;
         }
         let here = map.lane(lane).centre.pose_at(at_m).position;

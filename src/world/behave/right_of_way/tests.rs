@@ -8,7 +8,7 @@ use crate::behave::right_of_way::order::right_of_way;
 use crate::behave::right_of_way::room::allowed_mps;
 use crate::behave::right_of_way::side::Side;
 use crate::behave::right_of_way::vehicle::Vehicle;
-use crate::sim::testing::{self, Heading, request};
+use crate::sim::testing::{self, Heading, request, told};
 use crate::sim::tests::hold;
 use crate::sim::{Contact, Control, Scene, Start, World};
 use crate::state::ego::VehicleParameters;
@@ -18,7 +18,7 @@ use crate::state::rights::{Foreseen, Meeting, Place, Rights};
 use crate::state::road_user::Motion;
 use crate::state::ruling::{Mover, Rule, Ruling};
 use crate::state::sensed::SignalColour;
-use avastra_lang::model::vocabulary::Priority;
+use avastra_lang::model::vocabulary::{Field, Priority};
 use avastra_lang::model::vocabulary::{LaneChoice, Then, Verb};
 use avastra_road::{LaneIndex, RoadMap};
 
@@ -425,7 +425,7 @@ fn who_stands_beside_the_road_did_not_come_to_an_ego_vehicle_that_leaves_it() {
     // The road ends 1.75 m beside the ego vehicle's way. It drives so far to the right.
     let met = |person_m: f64, ego_m: f64| {
         let mut world = testing::world(&testing::overpass(3.0));
-        let beside = SpawnRequest { offset_m: -person_m, ..request(Verb::Stand, 40.0, 1.4) };
+        let beside = told(request(Verb::Stand, 40.0, 1.4), Field::Offset, -person_m);
         world.apply(&Effect::Spawn(beside)).expect("there is room");
         let way_m = world.ego().rear_axle.position.y - ego_m;
         for _ in 0..400 {

@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use avastra_base::geometry::Path;
-use avastra_lang::model::command::{Command, IgnoredRules, Told};
-use avastra_lang::model::vocabulary::{LaneChoice, TrafficRule, Turning, Verb};
+use avastra_lang::model::command::{Command, Told};
+use avastra_lang::model::field::{IgnoredRules, Said};
+use avastra_lang::model::vocabulary::{Field, LaneChoice, TrafficRule, Turning, Verb};
 use avastra_lang::model::{Laid, Trajectory};
 
 use crate::action::{Effect, OnTrajectory, OrderRequest, SpawnRequest, Surroundings};
 use crate::scene::Scene;
-use crate::sim::testing::request;
+use crate::sim::testing::{request, told};
 use crate::sim::{DT_S, Obstacle, Start, VehicleParameters, World, testing};
 
 use super::{drive, driven, hold, spawn};
@@ -42,7 +43,8 @@ fn a_gap_to_the_ego_vehicle_is_kept_ahead_and_behind() {
     ] {
         let mut world = driven(&testing::straight(), 10.0, 8.0);
         let user = spawn(&mut world, named(request(verb, 16.0, 10.0)));
-        let command = Command { keep_m: gap.0, keep_s: gap.1, ..Command::default() };
+        let (value, second) = (gap.0.or(gap.1).expect("it is one of the two"), gap.1.is_some());
+        let command = Command::default().with(Field::Keep, Said::Figure { value, second });
         order(&mut world, command);
         for (speed_mps, time_s) in [(10.0, 18.0), (8.0, 14.0), (6.0, 14.0)] {
             drive(&mut world, speed_mps, time_s);
@@ -76,7 +78,7 @@ fn a_gap_to_another_one_is_the_same_whoever_appears_first() {
             let appears = request(Verb::DriveAhead, ahead_m, 10.0);
             ids[who] = spawn(&mut world, SpawnRequest { bearer: Some(who), ..appears }).id;
         }
-        let command = Command { keep_m: Some(10.0), to: Some(leader), ..Command::default() };
+        let command = Command::default().with(Field::Keep, 10.0).with(Field::To, Said::Who(leader));
         order(&mut world, command);
         drive(&mut world, 10.0, 20.0);
         let [behind, ahead] = ids.map(|id| there(&world, id).outline);
@@ -91,12 +93,13 @@ fn a_lane_change_that_is_broken_off_early_leads_back_and_no_farther() {
     for (out_mps, after_s, back_mps) in [(1.0, 0.7, 3.0), (0.6, 3.0, 3.0), (2.0, 0.1, 1.0)] {
         let mut world = driven(&testing::straight(), 8.0, 1.0);
         let user = spawn(&mut world, named(request(Verb::DriveAhead, 40.0, 8.0)));
-        let told = |lane, mps| Command { lane: Some(lane), aside_mps: Some(mps), ..Command::default() };
-        order(&mut world, told(LaneChoice::Right, out_mps));
+        let told_to =
+            |lane: LaneChoice, mps: f64| Command::default().with(Field::Lane, lane).with(Field::Aside, mps);
+        order(&mut world, told_to(LaneChoice::Right, out_mps));
         drive(&mut world, 8.0, after_s);
         let left_m = there(&world, user.id).outline.pose.position.y;
         assert!((-5.25..-1.75).contains(&left_m), "{left_m} m: it is on its way");
-        order(&mut world, told(LaneChoice::Current, back_mps));
+        order(&mut world, told_to(LaneChoice::Current, back_mps));
         for _ in 0..700 {
             world.tick(&hold(&world, 8.0));
             let y_m = there(&world, user.id).outline.pose.position.y;
@@ -110,7 +113,12 @@ fn a_lane_change_that_is_broken_off_early_leads_back_and_no_farther() {
 fn who_keeps_a_short_gap_brakes_as_hard_as_it_must() {
     let mut world = driven(&testing::straight(), 15.0, 8.0);
     let user = spawn(&mut world, named(request(Verb::DriveBehind, 12.0, 15.0)));
-    order(&mut world, Command { keep_s: Some(0.6), speed_mps: Some(20.0), ..Command::default() });
+    order(
+        &mut world,
+        Command::default()
+            .with(Field::Keep, Said::Figure { value: 0.6, second: true })
+            .with(Field::Speed, 20.0),
+    );
     drive(&mut world, 15.0, 15.0);
     let contacts = drive(&mut world, 0.0, 10.0);
     assert!(contacts.is_empty(), "{contacts:?}");
@@ -124,12 +132,8 @@ fn somebody_is_at_a_place_so_much_before_the_ego_vehicle() {
         let lane = LaneChoice::Right;
         let user = spawn(&mut world, named(SpawnRequest { lane, ..request(Verb::DriveAhead, 10.0, 8.0) }));
         let place_m = ego_front_m(&world) + 100.0;
-        let command = Command {
-            early_s: Some(early_s),
-            at_m: Some(place_m),
-            speed_mps: Some(20.0),
-            ..Command::default()
-        };
+        let command =
+            Command::default().with(Field::Early, early_s).with(Field::At, place_m).with(Field::Speed, 20.0);
         order(&mut world, command);
         let x_m = world.ego_outline().pose.position.x + world.ego_outline().half_length_m + 100.0;
         let (mut own_s, mut ego_s) = (None, None);
@@ -158,9 +162,9 @@ fn somebody_who_crosses_is_there_so_much_before_the_ego_vehicle() {
         }
         let user = {
             let ignores = IgnoredRules::of([TrafficRule::Ego]);
-            spawn(&mut world, named(SpawnRequest { ignores, ..request(Verb::CrossRoad, 30.0, 10.0) }))
+            spawn(&mut world, named(told(request(Verb::CrossRoad, 30.0, 10.0), Field::Ignores, ignores)))
         };
-        let command = Command { early_s: Some(early_s), speed_mps: Some(20.0), ..Command::default() };
+        let command = Command::default().with(Field::Early, early_s).with(Field::Speed, 20.0);
         order(&mut world, command);
         // Where the two straight ways cross.
         let cross = world.scene().route.path.position_at(world.scene().route.conflicts[0].station_m);
@@ -190,12 +194,12 @@ fn somebody_who_crosses_is_there_so_much_before_the_ego_vehicle() {
 fn nobody_is_early_where_ways_do_not_cross() {
     let mut world = driven(&testing::straight(), 10.0, 3.0);
     spawn(&mut world, named(request(Verb::DriveAhead, 30.0, 8.0)));
-    let command = Command { early_s: Some(1.0), ..Command::default() };
+    let command = Command::default().with(Field::Early, 1.0);
     let order = OrderRequest { bearer: 0, command, phases: Told::NOTHING };
     let refusal = world.order_refusal(&order);
     assert_eq!(refusal.as_deref(), Some("its way does not cross the ego vehicle's ahead of it"));
     // It may be told to turn first.
-    let command = Command { turn: Some(Turning::Left), ..command };
+    let command = command.with(Field::Turn, Turning::Left);
     assert_ne!(world.order_refusal(&OrderRequest { command, ..order }), refusal);
 }
 
@@ -203,14 +207,14 @@ fn nobody_is_early_where_ways_do_not_cross() {
 fn pedestrians_walk_along_the_road_and_step_aside_when_told() {
     for (verb, forward) in [(Verb::WalkAhead, 1.0), (Verb::WalkOpposite, -1.0)] {
         let mut world = driven(&testing::straight(), 5.0, 8.0);
-        let user = spawn(&mut world, named(SpawnRequest { offset_m: -1.5, ..request(verb, 80.0, 1.4) }));
+        let user = spawn(&mut world, named(told(request(verb, 80.0, 1.4), Field::Offset, -1.5)));
         let from = there(&world, user.id).outline.pose.position;
         assert!((user.velocity_mps.x - forward * 1.4).abs() < 1e-9);
         drive(&mut world, 1.0, 10.0);
         let way = there(&world, user.id).outline.pose.position - from;
         assert!((way.x - forward * 14.0).abs() < 1e-6 && way.y.abs() < 1e-6, "{verb:?} {way:?}");
         // Into the middle of the lane, at 1 m/s, and back again.
-        let command = Command { offset_m: Some(0.0), aside_mps: Some(1.0), ..Command::default() };
+        let command = Command::default().with(Field::Offset, 0.0).with(Field::Aside, 1.0);
         order(&mut world, command);
         drive(&mut world, 1.0, 1.4);
         assert!(!world.has_done(user.id, &command));
@@ -218,12 +222,12 @@ fn pedestrians_walk_along_the_road_and_step_aside_when_told() {
         assert!(world.has_done(user.id, &command));
         let way = there(&world, user.id).outline.pose.position - from;
         assert!((way.y - 1.5).abs() < 1e-9, "{way:?}");
-        order(&mut world, Command { speed_mps: Some(-2.0), ..Command::default() });
+        order(&mut world, Command::default().with(Field::Speed, -2.0));
         let turns_at = there(&world, user.id).outline.pose.position;
         drive(&mut world, 1.0, 2.0);
         let back = there(&world, user.id).outline.pose.position - turns_at;
         assert!((back.x + forward * 4.0).abs() < 1e-6, "{back:?}");
-        order(&mut world, Command { speed_mps: Some(0.0), ..Command::default() });
+        order(&mut world, Command::default().with(Field::Speed, 0.0));
         drive(&mut world, 1.0, 1.0);
         assert_eq!(there(&world, user.id).velocity_mps.norm(), 0.0);
     }
@@ -233,7 +237,7 @@ fn pedestrians_walk_along_the_road_and_step_aside_when_told() {
 fn a_pedestrian_who_waits_sets_out_after_that_time() {
     for waits_s in [0.0, 2.5] {
         let mut world = driven(&testing::straight(), 5.0, 8.0);
-        let walker = SpawnRequest { waits_s: Some(waits_s), ..request(Verb::Walk, 90.0, 1.4) };
+        let walker = told(request(Verb::Walk, 90.0, 1.4), Field::Waits, waits_s);
         let user = spawn(&mut world, walker);
         let from = user.outline.pose.position;
         drive(&mut world, 2.0, 5.0);
@@ -261,9 +265,9 @@ fn who_follows_a_trajectory_is_at_a_place_of_it_when_the_ego_vehicle_is_at_one_o
         };
         let user = spawn(&mut world, named(asked)).id;
         let at_m = 110.0;
-        let early_s = Some(0.0);
-        let told = Command { early_s, at_m: Some(at_m), reach_m: Some(reach_m), ..Command::default() };
-        order(&mut world, Command { speed_mps: Some(speed_mps), steady_m: Some(steady_m), ..told });
+        let meets = Command::default().with(Field::Early, 0.0).with(Field::At, at_m);
+        let meets = meets.with(Field::Reach, reach_m).with(Field::Steady, steady_m);
+        order(&mut world, meets.with(Field::Speed, speed_mps));
         let mut last_mps = 0.0;
         while ego_front_m(&world) < at_m {
             world.tick(&hold(&world, 10.0));

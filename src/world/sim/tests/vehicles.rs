@@ -1,6 +1,7 @@
 //! How other vehicles move: on bends, after a crash, at stop signs, by each traffic profile.
 
-use avastra_lang::model::command::{Command, IgnoredRules, Told};
+use avastra_lang::model::command::{Command, Told};
+use avastra_lang::model::field::IgnoredRules;
 use std::sync::Arc;
 
 use crate::action::{Effect, OrderRequest, SpawnRequest, Surroundings};
@@ -10,7 +11,7 @@ use crate::sim::{Control, DT_S, Scene, Start, TrafficProfile, World, testing};
 use avastra_base::geometry::{OrientedBox, Path, Pose, Vec2, distance_m};
 use avastra_lang::model::body::{self, BodyParameters};
 use avastra_lang::model::vocabulary::{
-    Body, LaneChoice, Level, Phenomenon, Side, Then, TrafficRule, Verb, Word,
+    Body, Field, LaneChoice, Level, Phenomenon, Side, Then, TrafficRule, Verb, Word,
 };
 
 use super::{drive, driven, hold, spawn, y_m};
@@ -88,8 +89,7 @@ fn an_order_changes_speed_at_its_rate() {
     for (speed_mps, rate_mps2) in [(0.0, 3.0), (4.0, 1.5), (0.0, 6.0), (14.0, 0.5)] {
         let mut world = driven(&testing::straight(), 8.0, 1.0);
         let user = spawn(&mut world, named);
-        let command =
-            Command { speed_mps: Some(speed_mps), rate_mps2: Some(rate_mps2), ..Command::default() };
+        let command = Command::default().with(Field::Speed, speed_mps).with(Field::Rate, rate_mps2);
         let order = OrderRequest { bearer: 7, command, phases: Told::NOTHING };
         world.apply(&Effect::Order(order)).expect("it is there and drives");
         let from_m = user.outline.pose.position.x;
@@ -122,7 +122,7 @@ fn who_ignores_others_runs_into_the_one_ahead() {
     {
         let mut world = driven(&testing::straight(), 3.0, 1.0);
         spawn(&mut world, request(Verb::DriveAhead, 80.0, 2.0));
-        spawn(&mut world, SpawnRequest { ignores, ..request(Verb::DriveAhead, 30.0, 14.0) });
+        spawn(&mut world, testing::told(request(Verb::DriveAhead, 30.0, 14.0), Field::Ignores, ignores));
         let mut has_met = false;
         for _ in 0..800 {
             world.tick(&hold(&world, 3.0));
@@ -139,7 +139,7 @@ fn a_told_time_gap_is_kept_as_the_driver_model_has_it() {
         let leader = spawn(&mut world, request(Verb::DriveAhead, 120.0, 10.0));
         let named = SpawnRequest { bearer: Some(0), ..request(Verb::DriveAhead, 60.0, 10.0) };
         let follower = spawn(&mut world, named);
-        let command = Command { speed_mps: Some(20.0), time_gap_s: Some(gap_s), ..Command::default() };
+        let command = Command::default().with(Field::Speed, 20.0).with(Field::TimeGap, gap_s);
         world
             .apply(&Effect::Order(OrderRequest { bearer: 0, command, phases: Told::NOTHING }))
             .expect("it is there");
@@ -158,7 +158,7 @@ fn an_order_is_for_the_latest_bearer_and_no_wreck_obeys() {
     let mut world = driven(&testing::straight(), 8.0, 1.0);
     let order = OrderRequest {
         bearer: 0,
-        command: Command { speed_mps: Some(3.0), ..Command::default() },
+        command: Command::default().with(Field::Speed, 3.0),
         phases: Told::NOTHING,
     };
     assert_eq!(world.order_refusal(&order).as_deref(), Some("no road user of that name is there"));
@@ -182,7 +182,7 @@ fn an_order_is_for_the_latest_bearer_and_no_wreck_obeys() {
         Some("it is on foot, and can be told a `speed` alone")
     );
     assert_eq!(world.order_refusal(&OrderRequest { phases: Told::NOTHING, ..manoeuvre }), None);
-    let backwards = Command { speed_mps: Some(-1.0), ..Command::default() };
+    let backwards = Command::default().with(Field::Speed, -1.0);
     let car = SpawnRequest { bearer: Some(1), ..request(Verb::DriveOpposite, 60.0, 9.0) };
     spawn(&mut world, car);
     let refusal = world.order_refusal(&OrderRequest { bearer: 1, command: backwards, phases: Told::NOTHING });
