@@ -482,7 +482,7 @@ fn an_ambulance_passes_red_lights_and_is_the_only_one_that_does() {
         let mut choose = |moment: &Moment| {
             let breakers = moment.situation.surroundings.moment().rule_breakers;
             let legal = rows.iter().find_map(|row| table.offer(moment.situation, *row).ok());
-            assert!(legal.is_none() || breakers == 0, "{breakers} break rules already");
+            assert!(legal.is_none() || breakers == 0.0, "{breakers} break rules already");
             came += usize::from(legal.is_some());
             legal.map_or(Choice::Pass, Choice::Act)
         };
@@ -510,7 +510,7 @@ fn who_runs_into_a_siren_had_to_wait() {
             };
             let mut is_running = false;
             let log = run.play(episode, &mut choose, &mut |world, _, _| {
-                assert_eq!(world.moment_facts().rule_breakers, 0);
+                assert_eq!(world.moment_facts().rule_breakers, 0.0);
                 is_running |= world.obstacles().any(|other| world.runs_signal(other.id));
             });
             assert_replays(&run, episode, &log);

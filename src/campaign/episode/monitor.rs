@@ -11,13 +11,13 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 use avastra_lang::model::expr::ExprKind;
-use avastra_lang::model::vocabulary::{Fact, WordFact};
+use avastra_lang::model::vocabulary::{Fact, Part, Parts, WordFact};
 use avastra_lang::model::{
     Asked, BodyWord, Facts, FnDef, Kept, Memory, NearFacts, NpcFacts, ReadyRequirement, RequirementDef,
     RequirementMemory, Sliding, SpawnFacts, WorldFacts,
 };
 use avastra_lang::prove::is_never_asked;
-use avastra_world::sim::{DT_S, Encroachment, MomentParts, Obstacle, Watched, WatchedParts, World};
+use avastra_world::sim::{DT_S, Encroachment, Obstacle, Watched, World};
 
 use super::setup::Setup;
 
@@ -64,8 +64,7 @@ pub(super) struct Monitor {
     /// The requirements that nothing is asked of on this road, by index in `Space::requirements`.
     idle: Vec<usize>,
     /// What of the moment, and of what is watched, they ask for.
-    moment: MomentParts,
-    tick: WatchedParts,
+    parts: Parts,
     /// The road users that requirements name, by index in `Space::bearers`.
     bearers: Vec<usize>,
     /// The bodies of the road users near of which they ask, by bit.
@@ -216,12 +215,11 @@ impl Monitor {
         bearers.sort_unstable();
         bearers.dedup();
         let questions = Questions::by(setup, &watches);
-        let (facts, words) = (|| questions.facts.iter().copied(), || questions.words.iter().copied());
+        let parts = Parts::of(questions.facts.iter().copied(), questions.words.iter().copied());
         let monitor = Monitor {
-            moment: MomentParts::of(facts(), words()),
-            tick: WatchedParts::of(facts(), words()),
+            parts,
             watched: Watched::default(),
-            encroachment: questions.facts.contains(&Fact::NpcPet).then(Encroachment::default),
+            encroachment: parts.has(Part::Encroachment).then(Encroachment::default),
             facts: WorldFacts::default(),
             watches,
             idle,
@@ -242,9 +240,9 @@ impl Monitor {
         memory: &Memory,
         step: usize,
     ) {
-        self.facts.moment = world.moment_facts_of(self.moment);
+        self.facts.moment = world.moment_facts_of(self.parts);
         self.facts.step = step as u64;
-        self.facts.tick = self.watched.look(world, self.tick);
+        self.facts.tick = self.watched.look(world, self.parts);
         if !self.bearers.is_empty() {
             self.facts.bearers.clear();
             let there = self.bearers.iter().filter_map(|who| Some((*who, world.bearer_facts(*who)?)));
@@ -257,10 +255,10 @@ impl Monitor {
             self.facts.near.clear();
             self.facts.near.extend(near(world, own_bodies, self.asks_of));
         }
-        let (watched, encroachment, tick) = (&self.watched, &self.encroachment, self.tick);
+        let (watched, encroachment, parts) = (&self.watched, &self.encroachment, self.parts);
         let watched_of = |id: u32, npc: NpcFacts| {
             let pet_s = encroachment.as_ref().map_or(npc.pet_s, |encroachment| encroachment.pet_s(id));
-            watched.of_near(world, id, NpcFacts { pet_s, ..npc }, tick)
+            watched.of_near(world, id, NpcFacts { pet_s, ..npc }, parts)
         };
         for near in &mut self.facts.near {
             near.npc = watched_of(near.id, near.npc);

@@ -14,6 +14,56 @@ use crate::model::value::{Type, Value};
 use crate::model::vocabulary::{Known, ROAD_LANES, Site, Word, WordFact, thing_of, words};
 use avastra_base::units::Dimension;
 
+/// Facts that are looked up together, because that costs something.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    Limit,
+    /// What the place on the route says, the limit included.
+    Route,
+    Crosswalks,
+    /// How many others there are, and the nearest of them.
+    Users,
+    RuleBreakers,
+    Lead,
+    OverRed,
+    OverStop,
+    OverLine,
+    OverCrosswalk,
+    OverOncoming,
+    /// Of the ego vehicle in its route's lane.
+    Lane,
+    EgoOffRoad,
+    Crosses,
+    Jerk,
+    /// Of each road user near.
+    LanesLeft,
+    OffRoad,
+    Encroachment,
+}
+
+/// Parts that somebody asks for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Parts(u32);
+
+impl Parts {
+    pub const ALL: Parts = Parts(u32::MAX);
+
+    /// The parts that these facts are in.
+    pub fn of(facts: impl IntoIterator<Item = Fact>, words: impl IntoIterator<Item = WordFact>) -> Parts {
+        let of_words = words.into_iter().filter_map(|word| match word {
+            WordFact::EgoLight | WordFact::EgoRoad | WordFact::EgoTurn => Some(Part::Route),
+            WordFact::EgoCrosses => Some(Part::Crosses),
+            _ => None,
+        });
+        let all = facts.into_iter().filter_map(Fact::part).chain(of_words);
+        Parts(all.fold(0, |bits, part| bits | 1 << part as u32))
+    }
+
+    pub fn has(self, part: Part) -> bool {
+        self.0 >> part as u32 & 1 == 1
+    }
+}
+
 /// What stands where a fact is found.
 trait FactValue: Copy {
     /// Where nothing is found.
@@ -30,18 +80,6 @@ trait Number: Copy {
 impl Number for f64 {
     fn number(self) -> f64 {
         self
-    }
-}
-
-impl Number for u32 {
-    fn number(self) -> f64 {
-        self.into()
-    }
-}
-
-impl Number for i32 {
-    fn number(self) -> f64 {
-        self.into()
     }
 }
 
@@ -62,7 +100,7 @@ macro_rules! numbers {
         })+
     };
 }
-numbers!(f64, u32, i32, u64);
+numbers!(f64, u64);
 
 impl FactValue for bool {
     const MISSING: Value = Value::Bool(false);
@@ -118,8 +156,17 @@ macro_rules! range {
     };
 }
 
+macro_rules! part_of {
+    () => {
+        None
+    };
+    ($part:ident) => {
+        Some(Part::$part)
+    };
+}
+
 macro_rules! facts {
-    ($($fact:ident $spelling:literal $ty:expr, $known:ident, $source:ident . $($part:ident).+ =
+    ($($fact:ident $spelling:literal $ty:expr, $known:ident, $source:ident . $($part:ident).+ $(in $of:ident)? =
        $meaning:literal $(, $range:expr)?;)+) => {
         words! { Fact "What an expression may ask about the world.": $($fact $spelling = $meaning),+ }
 
@@ -130,6 +177,11 @@ macro_rules! facts {
 
             pub fn known(self) -> Known {
                 match self { $(Fact::$fact => Known::$known),+ }
+            }
+
+            /// What it is looked up with; `None` if it costs nothing.
+            fn part(self) -> Option<Part> {
+                match self { $(Fact::$fact => part_of!($($of)?)),+ }
             }
 
             /// Its value; NaN, or false, where it is not known.
@@ -172,21 +224,21 @@ facts! {
         "A `Speed`: how fast the ego vehicle is.", 0.0..=SPEED_MPS_MAX;
     EgoAcceleration "ego.acceleration" ACCEL, World, moment.ego_acceleration_mps2 =
         "A `Accel`: of the ego vehicle, negative when it brakes.", -EGO_ACCELERATION_MPS2_MAX..=EGO_ACCELERATION_MPS2_MAX;
-    EgoLimit "ego.limit" SPEED, World, moment.ego_limit_mps =
+    EgoLimit "ego.limit" SPEED, World, moment.ego_limit_mps in Limit =
         "A `Speed`: the limit of the lane that the ego vehicle is in.", FROM_0;
-    EgoJunctionAhead "ego.junction_ahead" LENGTH, World, moment.ego_junction_ahead_m =
+    EgoJunctionAhead "ego.junction_ahead" LENGTH, World, moment.ego_junction_ahead_m in Route =
         "A `Length`: along the route to the next junction; 0 in one, 1000 m if there is none nearer.", 0.0..=JUNCTION_AHEAD_M_MAX;
-    EgoJunctionEnd "ego.junction_end" LENGTH, World, moment.ego_junction_end_m =
+    EgoJunctionEnd "ego.junction_end" LENGTH, World, moment.ego_junction_end_m in Route =
         "A `Length`: along the route to the end of that junction; 1000 m if there is none nearer.", 0.0..=JUNCTION_AHEAD_M_MAX;
-    EgoCrosswalkAhead "ego.crosswalk_ahead" LENGTH, World, moment.ego_crosswalk_ahead_m =
+    EgoCrosswalkAhead "ego.crosswalk_ahead" LENGTH, World, moment.ego_crosswalk_ahead_m in Crosswalks =
         "A `Length`: along the route to the next crosswalk; 0 on one, 1000 m if there is none nearer.", 0.0..=JUNCTION_AHEAD_M_MAX;
-    EgoLaneWidth "ego.lane_width" LENGTH, World, moment.ego_lane_width_m =
+    EgoLaneWidth "ego.lane_width" LENGTH, World, moment.ego_lane_width_m in Route =
         "A `Length`: of the route's lane at the ego vehicle.", FROM_0;
-    EgoLightSince "ego.light_since" DURATION, World, moment.ego_light_times.since_s =
+    EgoLightSince "ego.light_since" DURATION, World, moment.ego_light_times.since_s in Route =
         "A `Duration`: since when the light of `ego.light` has its colour; 1000 s if there is none.", 0.0..=SINCE_S_MAX;
-    EgoLightLeft "ego.light_left" DURATION, World, moment.ego_light_times.left_s =
+    EgoLightLeft "ego.light_left" DURATION, World, moment.ego_light_times.left_s in Route =
         "A `Duration`: until the light of `ego.light` changes; 1000 s if there is none.", 0.0..=SINCE_S_MAX;
-    EgoRouteLeft "ego.route_left" LENGTH, World, moment.ego_route_left_m =
+    EgoRouteLeft "ego.route_left" LENGTH, World, moment.ego_route_left_m in Route =
         "A `Length`: along the route to the goal.";
     EgoOffset "ego.offset" LENGTH, World, moment.ego_offset_m =
         "A `Length`: how far the ego vehicle is to the left of its route.";
@@ -194,13 +246,13 @@ facts! {
         "A `Length`: where the ego vehicle's front is along its route, whose start has 0 m.";
     EgoRear "ego.rear" LENGTH, World, moment.ego_rear_m =
         "A `Length`: where the ego vehicle's rear is along its route.";
-    RoadUsers "road_users" Type::Int, World, moment.road_users =
+    RoadUsers "road_users" Type::Int, World, moment.road_users in Users =
         "A `Int`: how many there are beside the ego vehicle.", 0.0..=f64::from(COMMANDED_MAX + AMBIENT_MAX);
-    RuleBreakers "rule_breakers" Type::Int, World, moment.rule_breakers =
+    RuleBreakers "rule_breakers" Type::Int, World, moment.rule_breakers in RuleBreakers =
         "A `Int`: how many of them ignore a rule of the road, as a spawn or a command told them to.", 0.0..=f64::from(COMMANDED_MAX + AMBIENT_MAX);
-    NearestGap "nearest.gap" LENGTH, World, moment.nearest_gap_m =
+    NearestGap "nearest.gap" LENGTH, World, moment.nearest_gap_m in Users =
         "A `Length`: to the nearest road user; 100 m if there is none.", FROM_0;
-    NearestSpeed "nearest.speed" SPEED, World, moment.nearest_speed_mps =
+    NearestSpeed "nearest.speed" SPEED, World, moment.nearest_speed_mps in Users =
         "A `Speed`: of the nearest road user; 0 if there is none.", FROM_0;
     Elapsed "elapsed" DURATION, World, moment.elapsed_s =
         "A `Duration`: since the episode began.", FROM_0;
@@ -250,13 +302,13 @@ facts! {
         "A `Length`: from its middle to the crosswalk that is the next one on the ego vehicle's route, or on which that is; 0 on it, 100 m if there is none or it is farther away.", 0.0..=CROSSWALK_GAP_M_MAX;
     NpcContactIn "npc.contact_in" DURATION, Spawn, npc.contact_in_s =
         "A `Duration`: until it and the ego vehicle touch, if both go on along and across the route as fast as now; 0 if they touch, 100 s if they do not.", 0.0..=TIME_S_MAX;
-    NpcPet "npc.pet" DURATION, Near, npc.pet_s =
+    NpcPet "npc.pet" DURATION, Near, npc.pet_s in Encroachment =
         "A `Duration`: since the other of the two left the place where one of them is now (post-encroachment time); 100 s if that is more than 5 s ago.", 0.0..=TIME_S_MAX;
-    NpcLeads "npc.leads" Type::Bool, Near, npc.leads =
+    NpcLeads "npc.leads" Type::Bool, Near, npc.leads in Lead =
         "A `Bool`: whether it is the road user that `ego.lead_gap` is about.";
-    NpcLanesLeft "npc.lanes_left" Type::Int, Near, npc.lanes_left =
+    NpcLanesLeft "npc.lanes_left" Type::Int, Near, npc.lanes_left in LanesLeft =
         "A `Int`: how many lanes its middle is to the left of the ego vehicle's lane, below 0 to the right; 0 in the same one, 100 if it is in no lane beside the route.";
-    NpcOffRoad "npc.off_road" LENGTH, Near, npc.off_road_m =
+    NpcOffRoad "npc.off_road" LENGTH, Near, npc.off_road_m in OffRoad =
         "A `Length`: from its middle to the nearest driving lane, at most 3 m; below 0 on one.";
     NpcInNextJunction "npc.in_next_junction" Type::Bool, Spawn, npc.in_next_junction =
         "A `Bool`: whether a vehicle is in the junction that `ego.junction_ahead` is about.";
@@ -270,31 +322,31 @@ facts! {
         "A `Length`: the gap from the ego vehicle to the road user that appears.", FROM_0;
     SafetyGap "safety_gap" LENGTH, Spawn, spawn.safety_gap_m =
         "A `Length`: the gap that a careful driver needs.", FROM_0;
-    EgoLeadGap "ego.lead_gap" LENGTH, Tick, tick.lead_gap_m =
+    EgoLeadGap "ego.lead_gap" LENGTH, Tick, tick.lead_gap_m in Lead =
         "A `Length`: to the next road user ahead in its way that does not come towards it; 1000 m if there is none nearer.", 0.0..=LEAD_GAP_M_MAX;
-    EgoLeadSpeed "ego.lead_speed" SPEED, Tick, tick.lead_speed_mps =
+    EgoLeadSpeed "ego.lead_speed" SPEED, Tick, tick.lead_speed_mps in Lead =
         "A `Speed`: of that road user along the route; 0 if there is none.";
-    EgoLeadSince "ego.lead_since" DURATION, Tick, tick.lead_since_s =
+    EgoLeadSince "ego.lead_since" DURATION, Tick, tick.lead_since_s in Lead =
         "A `Duration`: since when it has been that one; 0 if there is none.", FROM_0;
-    EgoOverRed "ego.over_red" LENGTH, Tick, tick.over_red_m =
+    EgoOverRed "ego.over_red" LENGTH, Tick, tick.over_red_m in OverRed =
         "A `Length`: how far its front is beyond the stop line of a light that was red as it passed, up to 30 m and while the light is red; else minus the way to a red light; at least -100 m.";
-    EgoOverStop "ego.over_stop" LENGTH, Tick, tick.over_stop_m =
+    EgoOverStop "ego.over_stop" LENGTH, Tick, tick.over_stop_m in OverStop =
         "A `Length`: how far its front is beyond the line of a stop sign, until its rear has passed, too; else minus the way to the next one; at least -100 m.";
-    EgoOverLine "ego.over_line" LENGTH, Tick, tick.over_line_m =
+    EgoOverLine "ego.over_line" LENGTH, Tick, tick.over_line_m in OverLine =
         "A `Length`: how far its front is beyond the stop line of a traffic light, whatever its colour, until its rear has passed, too; else minus the way to the next one; at least -100 m.";
-    EgoOverCrosswalk "ego.over_crosswalk" LENGTH, Tick, tick.over_crosswalk_m =
+    EgoOverCrosswalk "ego.over_crosswalk" LENGTH, Tick, tick.over_crosswalk_m in OverCrosswalk =
         "A `Length`: how far its front is beyond the near edge of a crosswalk of its route, until its rear has passed the far one; else minus the way to the next one; at least -100 m.";
-    EgoLaneOffset "ego.lane_offset" LENGTH, Tick, tick.lane_offset_m =
+    EgoLaneOffset "ego.lane_offset" LENGTH, Tick, tick.lane_offset_m in Lane =
         "A `Length`: how far its rear axle is to the left of the middle of its route's lane.";
-    EgoOverOncoming "ego.over_oncoming" LENGTH, Tick, tick.over_oncoming_m =
+    EgoOverOncoming "ego.over_oncoming" LENGTH, Tick, tick.over_oncoming_m in OverOncoming =
         "A `Length`: how far its outline reaches into a lane of the other direction; below 0 the room that is left; -100 m in junctions and where there is no such lane.";
-    EgoOverLane "ego.over_lane" LENGTH, Tick, tick.over_lane_m =
+    EgoOverLane "ego.over_lane" LENGTH, Tick, tick.over_lane_m in Lane =
         "A `Length`: how far its outline reaches beyond the lines of its route's lane (of both lanes where the route may change lanes); below 0 the room that is left; -100 m in junctions.";
-    EgoOffRoad "ego.off_road" LENGTH, Tick, tick.off_road_m =
+    EgoOffRoad "ego.off_road" LENGTH, Tick, tick.off_road_m in EgoOffRoad =
         "A `Length`: from its middle to the nearest driving lane, at most 3 m; below 0 on one.";
     EgoVisibility "ego.visibility" LENGTH, Tick, tick.visibility_m =
         "A `Length`: how far the fog lets one see; 10 km in clear air.";
-    EgoJerk "ego.jerk" JERK, Tick, tick.jerk_mps3 =
+    EgoJerk "ego.jerk" JERK, Tick, tick.jerk_mps3 in Jerk =
         "A `Jerk`: the change of the ego vehicle's acceleration over the last second, by that second; 0 in the first one.";
     EgoLateralAcceleration "ego.lateral_acceleration" ACCEL, Tick, tick.lateral_mps2 =
         "A `Accel`: of the ego vehicle to its left, negative to its right.";

@@ -9,6 +9,41 @@ use crate::model::on_route::Stretch;
 use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::{Crossing, LaneChoice, Light, Priority, RoadKind, Turn};
 
+/// What stands for a value that was not looked up.
+pub trait Unknown {
+    const UNKNOWN: Self;
+}
+
+macro_rules! unknown {
+    ($($of:ty = $unknown:expr;)+) => { $(impl Unknown for $of { const UNKNOWN: $of = $unknown; })+ };
+}
+
+unknown! {
+    f64 = f64::NAN;
+    bool = false;
+    Crossing = Crossing::None;
+    Light = Light::None;
+    LightTimes = LightTimes { since_s: f64::NAN, left_s: f64::NAN };
+    Priority = Priority::None;
+    RoadKind = RoadKind::OneWay;
+    Turn = Turn::None;
+}
+
+/// Declares a struct of facts whose default has looked up nothing.
+macro_rules! of_facts {
+    ($(#[$of:meta])* pub struct $name:ident { $($(#[$doc:meta])* pub $field:ident: $ty:ty,)+ }) => {
+        $(#[$of])*
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct $name { $($(#[$doc])* pub $field: $ty),+ }
+
+        impl Default for $name {
+            fn default() -> $name {
+                $name { $($field: Unknown::UNKNOWN),+ }
+            }
+        }
+    };
+}
+
 /// The facts that an expression may read. Facts that are not known at its place in the file keep their
 /// defaults.
 #[derive(Debug, Clone, Copy)]
@@ -65,65 +100,68 @@ impl NearFacts {
 /// Stands for a road user ahead that is farther away, and for none at all, m.
 pub const LEAD_GAP_M_MAX: f64 = 1000.0;
 
-/// What is watched over time for requirements ([`Known::Tick`]).
-///
-/// [`Known::Tick`]: crate::model::vocabulary::Known::Tick
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct TickFacts {
-    /// To the next road user ahead in the ego vehicle's way, and its speed along the route.
-    pub lead_gap_m: f64,
-    pub lead_speed_mps: f64,
-    pub lead_since_s: f64,
-    pub over_red_m: f64,
-    pub over_stop_m: f64,
-    pub over_line_m: f64,
-    pub over_crosswalk_m: f64,
-    pub crosses: Crossing,
-    pub lane_offset_m: f64,
-    pub over_oncoming_m: f64,
-    pub over_lane_m: f64,
-    /// How far its middle is beside all lanes, m.
-    pub off_road_m: f64,
-    pub visibility_m: f64,
-    pub jerk_mps3: f64,
-    pub lateral_mps2: f64,
+of_facts! {
+    /// What is watched over time for requirements ([`Known::Tick`]).
+    ///
+    /// [`Known::Tick`]: crate::model::vocabulary::Known::Tick
+    pub struct TickFacts {
+        /// To the next road user ahead in the ego vehicle's way, and its speed along the route.
+        pub lead_gap_m: f64,
+        pub lead_speed_mps: f64,
+        pub lead_since_s: f64,
+        pub over_red_m: f64,
+        pub over_stop_m: f64,
+        pub over_line_m: f64,
+        pub over_crosswalk_m: f64,
+        pub crosses: Crossing,
+        pub lane_offset_m: f64,
+        pub over_oncoming_m: f64,
+        pub over_lane_m: f64,
+        /// How far its middle is beside all lanes, m.
+        pub off_road_m: f64,
+        pub visibility_m: f64,
+        pub jerk_mps3: f64,
+        pub lateral_mps2: f64,
+    }
 }
 
 /// The longest time that `since` tells, s: also of actions that never happened.
 pub const SINCE_S_MAX: f64 = 1000.0;
 
-/// What can be asked about the ego vehicle and its surroundings at a moment.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct MomentFacts {
-    pub ego_speed_mps: f64,
-    pub ego_acceleration_mps2: f64,
-    /// Limit of the route's lane at the ego vehicle.
-    pub ego_limit_mps: f64,
-    /// Along the route to the next junction: 0 inside one, at most [`JUNCTION_AHEAD_M_MAX`].
-    pub ego_junction_ahead_m: f64,
-    /// The same to the end of that junction.
-    pub ego_junction_end_m: f64,
-    pub ego_crosswalk_ahead_m: f64,
-    /// Of the route's lane at the ego vehicle.
-    pub ego_lane_width_m: f64,
-    pub ego_route_left_m: f64,
-    /// Positive to the left of the route.
-    pub ego_offset_m: f64,
-    /// Stations of its bumpers on the route.
-    pub ego_front_m: f64,
-    pub ego_rear_m: f64,
-    pub ego_light: Light,
-    pub ego_light_times: LightTimes,
-    pub ego_road: RoadKind,
-    /// Where the route goes at the next junction.
-    pub ego_turn: Turn,
-    pub road_users: u32,
-    /// Those that were told to ignore a rule of the road.
-    pub rule_breakers: u32,
-    /// Between the outlines.
-    pub nearest_gap_m: f64,
-    pub nearest_speed_mps: f64,
-    pub elapsed_s: f64,
+of_facts! {
+    /// What can be asked about the ego vehicle and its surroundings at a moment.
+    pub struct MomentFacts {
+        pub ego_speed_mps: f64,
+        pub ego_acceleration_mps2: f64,
+        /// Limit of the route's lane at the ego vehicle.
+        pub ego_limit_mps: f64,
+        /// Along the route to the next junction: 0 inside one, at most [`JUNCTION_AHEAD_M_MAX`].
+        pub ego_junction_ahead_m: f64,
+        /// The same to the end of that junction.
+        pub ego_junction_end_m: f64,
+        pub ego_crosswalk_ahead_m: f64,
+        /// Of the route's lane at the ego vehicle.
+        pub ego_lane_width_m: f64,
+        pub ego_route_left_m: f64,
+        /// Positive to the left of the route.
+        pub ego_offset_m: f64,
+        /// Stations of its bumpers on the route.
+        pub ego_front_m: f64,
+        pub ego_rear_m: f64,
+        pub ego_light: Light,
+        pub ego_light_times: LightTimes,
+        pub ego_road: RoadKind,
+        /// Where the route goes at the next junction.
+        pub ego_turn: Turn,
+        /// How many there are beside the ego vehicle.
+        pub road_users: f64,
+        /// Those that were told to ignore a rule of the road.
+        pub rule_breakers: f64,
+        /// Between the outlines.
+        pub nearest_gap_m: f64,
+        pub nearest_speed_mps: f64,
+        pub elapsed_s: f64,
+    }
 }
 
 /// Since when a light has its colour and until when, s: [`SINCE_S_MAX`] without a light.
@@ -133,75 +171,74 @@ pub struct LightTimes {
     pub left_s: f64,
 }
 
-impl Default for LightTimes {
-    fn default() -> LightTimes {
-        LightTimes { since_s: SINCE_S_MAX, left_s: SINCE_S_MAX }
-    }
+impl LightTimes {
+    pub const NO_LIGHT: LightTimes = LightTimes { since_s: SINCE_S_MAX, left_s: SINCE_S_MAX };
 }
 
 /// Stands for a junction that is farther away, and for none at all, m.
 pub const JUNCTION_AHEAD_M_MAX: f64 = 1000.0;
 
-/// What can be asked about a road user other than the ego vehicle at a moment.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct NpcFacts {
-    pub speed_mps: f64,
-    /// Along its heading, negative when it brakes.
-    pub acceleration_mps2: f64,
-    /// To the ego vehicle, between the outlines.
-    pub gap_m: f64,
-    /// Along its way to the next junction, as in [`MomentFacts`].
-    pub junction_ahead_m: f64,
-    /// From its front, and from the ego vehicle's, to where their ways cross next.
-    pub crossing_ahead_m: f64,
-    pub ego_crossing_ahead_m: f64,
-    /// From its front to the end of its lane, at most [`JUNCTION_AHEAD_M_MAX`].
-    pub lane_left_m: f64,
-    /// Limit of the lane that it is in.
-    pub limit_mps: f64,
-    /// The next light on its way; none for who is on foot.
-    pub light: Light,
-    pub light_times: LightTimes,
-    /// Which of it and the ego vehicle goes first, since one of them came into the other's way.
-    pub priority: Priority,
-    /// Stations of its ends on the ego vehicle's route.
-    pub front_m: f64,
-    pub rear_m: f64,
-    /// How far its middle is to the left of that route.
-    pub offset_m: f64,
-    /// Until the stretches of the route beside the two meet, at most [`TIME_S_MAX`].
-    pub ttc_s: f64,
-    /// Way between the two, by the speed of the one behind, at most [`TIME_S_MAX`].
-    pub headway_s: f64,
-    /// Its speed along that route, and to the left across it.
-    pub along_mps: f64,
-    pub across_mps: f64,
-    /// The room between the two across the route; below 0 they overlap.
-    pub aside_m: f64,
-    /// How far it reaches into the ego vehicle's lane there; below 0 what is missing.
-    pub in_lane_m: f64,
-    /// From its middle to the nearest crosswalk, at most [`CROSSWALK_GAP_M_MAX`].
-    pub crosswalk_gap_m: f64,
-    /// The same of the crosswalk that is the next one on the ego vehicle's route.
-    pub next_crosswalk_gap_m: f64,
-    /// Until the two touch, if both go on along and across the route as now, at most [`TIME_S_MAX`].
-    pub contact_in_s: f64,
-    /// Since one of the two left the place where the other is, at most [`TIME_S_MAX`]. Known only to who watches.
-    pub pet_s: f64,
-    /// Where it is along the trajectory that it follows; 0 if it follows none.
-    pub station_m: f64,
-    pub has_siren: bool,
-    /// Whether it and another one than the ego vehicle have crashed into each other. Known only of who is there.
-    pub crashed: bool,
-    /// Whether it is the one ahead of the ego vehicle, in which lane to the left of that one's it is, and how far off the road, m:
-    /// known only to who watches.
-    pub leads: bool,
-    pub lanes_left: i32,
-    pub off_road_m: f64,
-    /// Whether it drives in the junction that is the next one of the ego vehicle's route.
-    pub in_next_junction: bool,
-    /// Where it means to go at the next junction; nowhere for who is on foot.
-    pub turn: Turn,
+of_facts! {
+    /// What can be asked about a road user other than the ego vehicle at a moment.
+    pub struct NpcFacts {
+        pub speed_mps: f64,
+        /// Along its heading, negative when it brakes.
+        pub acceleration_mps2: f64,
+        /// To the ego vehicle, between the outlines.
+        pub gap_m: f64,
+        /// Along its way to the next junction, as in [`MomentFacts`].
+        pub junction_ahead_m: f64,
+        /// From its front, and from the ego vehicle's, to where their ways cross next.
+        pub crossing_ahead_m: f64,
+        pub ego_crossing_ahead_m: f64,
+        /// From its front to the end of its lane, at most [`JUNCTION_AHEAD_M_MAX`].
+        pub lane_left_m: f64,
+        /// Limit of the lane that it is in.
+        pub limit_mps: f64,
+        /// The next light on its way; none for who is on foot.
+        pub light: Light,
+        pub light_times: LightTimes,
+        /// Which of it and the ego vehicle goes first, since one of them came into the other's way.
+        pub priority: Priority,
+        /// Stations of its ends on the ego vehicle's route.
+        pub front_m: f64,
+        pub rear_m: f64,
+        /// How far its middle is to the left of that route.
+        pub offset_m: f64,
+        /// Until the stretches of the route beside the two meet, at most [`TIME_S_MAX`].
+        pub ttc_s: f64,
+        /// Way between the two, by the speed of the one behind, at most [`TIME_S_MAX`].
+        pub headway_s: f64,
+        /// Its speed along that route, and to the left across it.
+        pub along_mps: f64,
+        pub across_mps: f64,
+        /// The room between the two across the route; below 0 they overlap.
+        pub aside_m: f64,
+        /// How far it reaches into the ego vehicle's lane there; below 0 what is missing.
+        pub in_lane_m: f64,
+        /// From its middle to the nearest crosswalk, at most [`CROSSWALK_GAP_M_MAX`].
+        pub crosswalk_gap_m: f64,
+        /// The same of the crosswalk that is the next one on the ego vehicle's route.
+        pub next_crosswalk_gap_m: f64,
+        /// Until the two touch, if both go on along and across the route as now, at most [`TIME_S_MAX`].
+        pub contact_in_s: f64,
+        /// Since one of the two left the place where the other is, at most [`TIME_S_MAX`]. Known only to who watches.
+        pub pet_s: f64,
+        /// Where it is along the trajectory that it follows; 0 if it follows none.
+        pub station_m: f64,
+        pub has_siren: bool,
+        /// Whether it and another one than the ego vehicle have crashed into each other. Known only of who is there.
+        pub crashed: bool,
+        /// Whether it is the one ahead of the ego vehicle, in which lane to the left of that one's it is, and how far off the road, m:
+        /// known only to who watches.
+        pub leads: bool,
+        pub lanes_left: f64,
+        pub off_road_m: f64,
+        /// Whether it drives in the junction that is the next one of the ego vehicle's route.
+        pub in_next_junction: bool,
+        /// Where it means to go at the next junction; nowhere for who is on foot.
+        pub turn: Turn,
+    }
 }
 
 /// Stands for a crosswalk that is farther away, and for none at all, m.

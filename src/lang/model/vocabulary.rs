@@ -11,7 +11,7 @@
 use crate::model::value::Type;
 use avastra_base::units::Dimension;
 
-pub use crate::model::fact::{Fact, parts_of, parts_of_named, things};
+pub use crate::model::fact::{Fact, Part, Parts, parts_of, parts_of_named, things};
 
 /// A word of the engine: it has a spelling, and the spelling finds it again.
 pub trait Word: Copy + PartialEq + 'static {

@@ -44,7 +44,7 @@ fn surroundings(world: &World, moment: &MomentFacts) -> [f64; 7] {
             Light::Yellow | Light::None => 0.0,
             Light::Green => 1.0,
         },
-        f64::from(moment.road_users),
+        moment.road_users,
         moment.nearest_gap_m,
         // Ours: the package's 100 would read as an obstacle faster than any other.
         moment.nearest_speed_mps,

@@ -95,21 +95,26 @@ fn conflict(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> Option<((f64, f64), (f
 /// From the first to the last station of `lane` at which it is within the corridor of `other`, on one level, m.
 fn stretch_near(lane: &Lane, other: &Lane) -> Option<(f64, f64)> {
     let path = &lane.centre;
-    let mut stretch: Option<(f64, f64)> = None;
     let steps = (path.length_m() / STEP_M).ceil().max(1.0);
     let step_m = path.length_m() / steps;
-    let mut step = 0;
-    while step <= steps as u32 {
-        let station_m = path.length_m() * f64::from(step) / steps;
-        let beside = other.centre.project(path.position_at(station_m));
-        if beside.distance_m < CORRIDOR_M && !lane.is_apart_at(station_m, other, beside.station_m) {
-            stretch = Some((stretch.map_or(station_m, |(from_m, _)| from_m), station_m));
+    let station_m = |step: u32| path.length_m() * f64::from(step) / steps;
+    let last = steps as u32;
+    // The first such step from one end on, by their numbers from there.
+    let first_of = |step_of: &dyn Fn(u32) -> u32| {
+        let mut nth = 0;
+        while nth <= last {
+            let station_m = station_m(step_of(nth));
+            let beside = other.centre.project(path.position_at(station_m));
+            if beside.distance_m < CORRIDOR_M && !lane.is_apart_at(station_m, other, beside.station_m) {
+                return Some(station_m);
+            }
+            // A metre of way brings a lane nearer by a metre at most: until then nothing is within the corridor.
+            let free_m = beside.distance_m - CORRIDOR_M - ROUNDING_M;
+            nth += ((free_m / step_m) as u32).max(1);
         }
-        // A metre of way brings a lane nearer by a metre at most: until then nothing is within the corridor.
-        let free_m = beside.distance_m - CORRIDOR_M - ROUNDING_M;
-        step += ((free_m / step_m) as u32).max(1);
-    }
-    stretch
+        None
+    };
+    Some((first_of(&|nth| nth)?, first_of(&|nth| last - nth)?))
 }
 
 /// Whether `a` goes before `b`; see [`order`].

@@ -48,5 +48,4 @@ pub use crate::state::trace::{Trace, Traced};
 pub use crate::state::world::{ENGINE, Start, World};
 pub use crate::step::ego::{Control, pedal_acceleration_mps2, pedals_for};
 pub use crate::view::encroachment::Encroachment;
-pub use crate::view::moment::MomentParts;
-pub use crate::view::watched::{Watched, WatchedParts};
+pub use crate::view::watched::Watched;

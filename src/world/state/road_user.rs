@@ -40,7 +40,7 @@ pub struct Mover {
     /// The name that its action gave it, by index in the space.
     pub bearer: Option<usize>,
     /// The manoeuvre that it does, until it ends or an order replaces it.
-    pub course: Option<Running>,
+    pub course: Option<Box<Running>>,
     /// How many phases of its last manoeuvre have begun, and ended, and how many there are. Nothing depends on them.
     pub phases: PhaseCount,
 }

@@ -62,7 +62,7 @@ impl World {
             if let Some(course) = course {
                 let running = Running::new(Arc::clone(course), self.ticks);
                 mover.phases = PhaseCount { all: running.phases(), ..PhaseCount::default() };
-                mover.course = Some(running);
+                mover.course = Some(Box::new(running));
             }
             if let (Some(rules), Motion::Drive(driver), true) =
                 (&draw.lane_changes, &mut mover.motion, may_change)
@@ -254,7 +254,7 @@ impl World {
                 }
                 (command, tracked) => command.or(tracked),
             };
-            mover.course = rest;
+            mover.course = rest.map(Box::new);
             let Some(command) = command else { continue };
             let to =
                 command.to().map(|who| self.bearer_id(who).filter(|id| *id != self.users[index].obstacle.id));

@@ -2,7 +2,7 @@
 //! user. Rules, policies and the paper's state variables read the same ones.
 
 use avastra_base::geometry::Vec2;
-use avastra_lang::model::vocabulary::{Fact, Light, Priority, Turn, WordFact};
+use avastra_lang::model::vocabulary::{Light, Part, Parts, Priority, Turn};
 use avastra_lang::model::{
     CROSSWALK_GAP_M_MAX, JUNCTION_AHEAD_M_MAX, LIGHT_AHEAD_M, LightTimes, MomentFacts, NpcFacts, OnRoute,
     SINCE_S_MAX, TIME_S_MAX, junction_ahead,
@@ -21,54 +21,14 @@ use crate::view::watched::own_lane;
 /// Distance that stands for "no road user around", m, as in the published package.
 const NO_ROAD_USER_M: f64 = 100.0;
 
-/// Facts of the moment that are looked up together.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct MomentParts {
-    pub limit: bool,
-    /// What the place on the route says, the limit included.
-    pub route: bool,
-    pub crosswalks: bool,
-    /// How many others there are, and the nearest of them.
-    pub users: bool,
-    pub rule_breakers: bool,
-}
-
-impl MomentParts {
-    /// The parts that these facts are in.
-    pub fn of(
-        facts: impl IntoIterator<Item = Fact>,
-        words: impl IntoIterator<Item = WordFact>,
-    ) -> MomentParts {
-        let mut parts = MomentParts::default();
-        for fact in facts {
-            match fact {
-                Fact::EgoLimit => parts.limit = true,
-                Fact::EgoJunctionAhead
-                | Fact::EgoJunctionEnd
-                | Fact::EgoLaneWidth
-                | Fact::EgoLightSince
-                | Fact::EgoLightLeft
-                | Fact::EgoRouteLeft => parts.route = true,
-                Fact::EgoCrosswalkAhead => parts.crosswalks = true,
-                Fact::RoadUsers | Fact::NearestGap | Fact::NearestSpeed => parts.users = true,
-                Fact::RuleBreakers => parts.rule_breakers = true,
-                _ => {}
-            }
-        }
-        let is_of_route = |word| matches!(word, WordFact::EgoLight | WordFact::EgoRoad | WordFact::EgoTurn);
-        parts.route |= words.into_iter().any(is_of_route);
-        parts
-    }
-}
-
 impl World {
     /// The facts of this moment.
     pub fn moment_facts(&self) -> MomentFacts {
         self.alone().moment_facts()
     }
 
-    /// These parts of the facts of this moment; the others have no meaning.
-    pub fn moment_facts_of(&self, parts: MomentParts) -> MomentFacts {
+    /// These parts of the facts of this moment; the others are unknown.
+    pub fn moment_facts_of(&self, parts: Parts) -> MomentFacts {
         self.alone().moment_facts_of(parts)
     }
 
@@ -97,16 +57,10 @@ impl World {
 impl Around<'_> {
     /// The facts of this moment. A road user that looks around does not count itself: see [`with_itself`].
     pub fn moment_facts(&self) -> MomentFacts {
-        self.moment_facts_of(MomentParts {
-            limit: true,
-            route: true,
-            crosswalks: true,
-            users: true,
-            rule_breakers: true,
-        })
+        self.moment_facts_of(Parts::ALL)
     }
 
-    fn moment_facts_of(&self, parts: MomentParts) -> MomentFacts {
+    fn moment_facts_of(&self, parts: Parts) -> MomentFacts {
         let mut facts = MomentFacts {
             ego_speed_mps: self.ego.speed_mps,
             ego_acceleration_mps2: self.ego.acceleration_mps2,
@@ -117,7 +71,7 @@ impl Around<'_> {
             elapsed_s: (self.tick as f64 * DT_S * 1000.0).round() / 1000.0,
             ..MomentFacts::default()
         };
-        if parts.route {
+        if parts.has(Part::Route) {
             let OnRoute { limit_mps, junction_ahead_m, junction_end_m, route_left_m, signal, road, turn } =
                 self.on_route();
             (facts.ego_limit_mps, facts.ego_junction_ahead_m) = (limit_mps, junction_ahead_m);
@@ -127,17 +81,18 @@ impl Around<'_> {
             facts.ego_turn = turn;
             (facts.ego_route_left_m, facts.ego_light, facts.ego_road) =
                 (route_left_m, self.light(signal), road);
-        } else if parts.limit {
+        } else if parts.has(Part::Limit) {
             let lane = self.scene.route.lane_at(self.ego_station_m).lane;
             facts.ego_limit_mps = self.scene.map.lane(lane).speed_limit_mps;
         }
-        if parts.crosswalks {
+        if parts.has(Part::Crosswalks) {
             facts.ego_crosswalk_ahead_m = self.crosswalk_ahead_m();
         }
-        if parts.users {
+        if parts.has(Part::Users) {
             let mut nearest: Option<&Obstacle> = None;
+            facts.road_users = 0.0;
             for obstacle in self.obstacles_on_level() {
-                facts.road_users += 1;
+                facts.road_users += 1.0;
                 if nearest.is_none_or(|nearest| obstacle.distance_m < nearest.distance_m) {
                     nearest = Some(obstacle);
                 }
@@ -145,11 +100,11 @@ impl Around<'_> {
             facts.nearest_gap_m = nearest.map_or(NO_ROAD_USER_M, |obstacle| obstacle.distance_m);
             facts.nearest_speed_mps = nearest.map_or(0.0, |obstacle| obstacle.velocity_mps.norm());
         }
-        if parts.rule_breakers {
+        if parts.has(Part::RuleBreakers) {
             let breaks = |(obstacle, _, driver): &(&Obstacle, _, &Driver)| {
                 !obstacle.is_apart && !driver.ignores.is_empty()
             };
-            facts.rule_breakers = self.drivers().filter(breaks).count() as u32;
+            facts.rule_breakers = self.drivers().filter(breaks).count() as f64;
         }
         facts
     }
@@ -181,7 +136,7 @@ impl Around<'_> {
     }
 
     fn light_times(&self, signal: Option<usize>) -> LightTimes {
-        signal.map_or_else(LightTimes::default, |signal| {
+        signal.map_or(LightTimes::NO_LIGHT, |signal| {
             let (since, left) = self.signals.around(&self.scene.map, signal, self.tick);
             let at_most = |ticks: u64| (ticks as f64 * DT_S).min(SINCE_S_MAX);
             LightTimes { since_s: at_most(since), left_s: at_most(left) }
@@ -204,14 +159,14 @@ pub fn with_itself(moment: MomentFacts, this: &Obstacle, driver: &Driver) -> Mom
     if this.is_apart {
         return moment;
     }
-    let is_nearest = moment.road_users == 0 || this.distance_m < moment.nearest_gap_m;
+    let is_nearest = moment.road_users == 0.0 || this.distance_m < moment.nearest_gap_m;
     let (nearest_gap_m, nearest_speed_mps) = match is_nearest {
         true => (this.distance_m, this.velocity_mps.norm()),
         false => (moment.nearest_gap_m, moment.nearest_speed_mps),
     };
     MomentFacts {
-        road_users: moment.road_users + 1,
-        rule_breakers: moment.rule_breakers + u32::from(!driver.ignores.is_empty()),
+        road_users: moment.road_users + 1.0,
+        rule_breakers: moment.rule_breakers + f64::from(!driver.ignores.is_empty()),
         nearest_gap_m,
         nearest_speed_mps,
         ..moment
@@ -325,7 +280,7 @@ fn facts(
         junction_ahead_m,
         limit_mps,
         light,
-        light_times: LightTimes::default(),
+        light_times: LightTimes::NO_LIGHT,
         priority: Priority::None,
         next_crosswalk_gap_m: around.next_crosswalk_gap_m(obstacle.outline.pose.position),
         contact_in_s: contact_in_s(lengthwise, sideways),
@@ -335,7 +290,7 @@ fn facts(
         crashed: false,
         in_next_junction: false,
         leads: false,
-        lanes_left: 0,
+        lanes_left: f64::NAN,
         off_road_m: f64::NAN,
         turn,
         front_m,
@@ -396,7 +351,7 @@ mod tests {
         let begin_m = inside.expect("the route crosses a junction").enter_m;
         assert_eq!(facts.ego_junction_ahead_m, begin_m);
         assert_eq!((facts.ego_road, facts.ego_light), (RoadKind::OneWay, Light::None));
-        assert_eq!((facts.road_users, facts.nearest_gap_m), (0, 100.0));
+        assert_eq!((facts.road_users, facts.nearest_gap_m), (0.0, 100.0));
         assert_eq!(facts.ego_turn, Turn::Straight);
         let (corner, mut turns) = (testing::corner(), Vec::new());
         let world = testing::world(&corner);

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use avastra_base::geometry::{Beside, Path, Projection, Vec2, unit_vector};
 use avastra_base::kinematics::STANDING_MPS;
-use avastra_lang::model::vocabulary::{Crossing, Fact, WordFact};
+use avastra_lang::model::vocabulary::{Crossing, Part, Parts};
 use avastra_lang::model::{LEAD_GAP_M_MAX, LIGHT_AHEAD_M, NpcFacts, TickFacts};
 use avastra_road::SignKind;
 
@@ -40,80 +40,50 @@ pub struct Watched {
     accelerations: VecDeque<f64>,
 }
 
-/// Watched facts that are looked up together.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct WatchedParts {
-    pub lead: bool,
-    pub red: bool,
-    pub stop: bool,
-    pub line: bool,
-    pub oncoming: bool,
-    pub lane: bool,
-    pub jerk: bool,
-    pub crosswalk: bool,
-    pub crosses: bool,
-    /// Of road users near.
-    pub lanes_left: bool,
-    pub off_road: bool,
-    pub ego_off_road: bool,
-}
-
-impl WatchedParts {
-    /// The parts that these facts are in.
-    pub fn of(
-        facts: impl IntoIterator<Item = Fact>,
-        words: impl IntoIterator<Item = WordFact>,
-    ) -> WatchedParts {
-        let crosses = words.into_iter().any(|word| word == WordFact::EgoCrosses);
-        let mut parts = WatchedParts { crosses, ..WatchedParts::default() };
-        for fact in facts {
-            match fact {
-                Fact::EgoLeadGap | Fact::EgoLeadSpeed | Fact::EgoLeadSince | Fact::NpcLeads => {
-                    parts.lead = true;
-                }
-                Fact::EgoOverCrosswalk => parts.crosswalk = true,
-                Fact::NpcLanesLeft => parts.lanes_left = true,
-                Fact::NpcOffRoad => parts.off_road = true,
-                Fact::EgoOffRoad => parts.ego_off_road = true,
-                Fact::EgoOverRed => parts.red = true,
-                Fact::EgoOverStop => parts.stop = true,
-                Fact::EgoOverOncoming => parts.oncoming = true,
-                Fact::EgoOverLine => parts.line = true,
-                Fact::EgoOverLane | Fact::EgoLaneOffset => parts.lane = true,
-                Fact::EgoJerk => parts.jerk = true,
-                _ => {}
-            }
-        }
-        parts
-    }
-}
-
 impl Watched {
-    /// Looks at the world after a tick, for these parts; the other facts have no meaning. To be called at every tick.
-    pub fn look(&mut self, world: &World, parts: WatchedParts) -> TickFacts {
+    /// Looks at the world after a tick, for these parts; the other facts are unknown. To be called at every tick.
+    pub fn look(&mut self, world: &World, parts: Parts) -> TickFacts {
         let around = world.alone();
-        let lead = if parts.lead { self.lead(world, &around) } else { None };
-        let since_s = |tick: u64| (world.ticks() - tick) as f64 * DT_S;
-        TickFacts {
-            lead_gap_m: lead.as_ref().map_or(LEAD_GAP_M_MAX, |lead| lead.gap_m),
-            lead_speed_mps: lead.map_or(0.0, |lead| lead.speed_mps),
-            lead_since_s: self.lead.map_or(0.0, |(_, tick, _)| since_s(tick)),
-            over_red_m: if parts.red { self.over_red_m(world, &around) } else { f64::NAN },
-            over_line_m: if parts.line { over_line_m(&around) } else { f64::NAN },
-            over_crosswalk_m: if parts.crosswalk { over_crosswalk_m(&around) } else { f64::NAN },
-            crosses: if parts.crosses { self.crosses(&around) } else { Crossing::None },
-            lane_offset_m: if parts.lane { lane_offset_m(&around) } else { f64::NAN },
-            over_stop_m: if parts.stop { over_stop_m(&around) } else { f64::NAN },
-            over_oncoming_m: if parts.oncoming { over_oncoming_m(&around) } else { f64::NAN },
-            over_lane_m: if parts.lane { over_lane_m(&around) } else { f64::NAN },
-            off_road_m: match parts.ego_off_road {
-                true => around.scene.map.lane_room_m(around.ego_outline.pose.position),
-                false => f64::NAN,
-            },
+        let mut facts = TickFacts {
             visibility_m: around.visibility_m,
-            jerk_mps3: if parts.jerk { self.jerk_mps3(around.ego.acceleration_mps2) } else { f64::NAN },
             lateral_mps2: around.ego.speed_mps * around.ego.yaw_rate_radps,
+            ..TickFacts::default()
+        };
+        if parts.has(Part::Lead) {
+            let lead = self.lead(world, &around);
+            let since_s = |tick: u64| (world.ticks() - tick) as f64 * DT_S;
+            facts.lead_gap_m = lead.as_ref().map_or(LEAD_GAP_M_MAX, |lead| lead.gap_m);
+            facts.lead_speed_mps = lead.map_or(0.0, |lead| lead.speed_mps);
+            facts.lead_since_s = self.lead.map_or(0.0, |(_, tick, _)| since_s(tick));
         }
+        if parts.has(Part::OverRed) {
+            facts.over_red_m = self.over_red_m(world, &around);
+        }
+        if parts.has(Part::OverStop) {
+            facts.over_stop_m = over_stop_m(&around);
+        }
+        if parts.has(Part::OverLine) {
+            facts.over_line_m = over_line_m(&around);
+        }
+        if parts.has(Part::OverCrosswalk) {
+            facts.over_crosswalk_m = over_crosswalk_m(&around);
+        }
+        if parts.has(Part::OverOncoming) {
+            facts.over_oncoming_m = over_oncoming_m(&around);
+        }
+        if parts.has(Part::Lane) {
+            (facts.lane_offset_m, facts.over_lane_m) = (lane_offset_m(&around), over_lane_m(&around));
+        }
+        if parts.has(Part::EgoOffRoad) {
+            facts.off_road_m = around.scene.map.lane_room_m(around.ego_outline.pose.position);
+        }
+        if parts.has(Part::Crosses) {
+            facts.crosses = self.crosses(&around);
+        }
+        if parts.has(Part::Jerk) {
+            facts.jerk_mps3 = self.jerk_mps3(around.ego.acceleration_mps2);
+        }
+        facts
     }
 
     /// The road user ahead. Somebody new is looked for ten times a second, as drivers look around.
@@ -132,10 +102,10 @@ impl Watched {
     }
 
     /// The facts of a road user near, with what of these parts is watched.
-    pub fn of_near(&self, world: &World, id: u32, npc: NpcFacts, parts: WatchedParts) -> NpcFacts {
+    pub fn of_near(&self, world: &World, id: u32, npc: NpcFacts, parts: Parts) -> NpcFacts {
         let leads = self.lead.is_some_and(|(lead, ..)| lead == id);
         let place = world.obstacle(id).map(|obstacle| obstacle.outline.pose.position);
-        let Some(place) = place.filter(|_| parts.lanes_left || parts.off_road) else {
+        let Some(place) = place.filter(|_| parts.has(Part::LanesLeft) || parts.has(Part::OffRoad)) else {
             return NpcFacts { leads, ..npc };
         };
         let around = world.alone();
@@ -144,12 +114,12 @@ impl Watched {
             let number = around.scene.lane_number(station_m, offset_m);
             let strip = around.scene.strip(station_m, number);
             let is_in_it = strip.is_some_and(|(right_m, left_m)| (right_m..=left_m).contains(&offset_m));
-            if is_in_it { number - own_lane(&around) } else { NO_LANE }
+            if is_in_it { f64::from(number - own_lane(&around)) } else { NO_LANE }
         };
         NpcFacts {
             leads,
-            lanes_left: if parts.lanes_left { lanes_left() } else { 0 },
-            off_road_m: if parts.off_road { around.scene.map.lane_room_m(place) } else { f64::NAN },
+            lanes_left: if parts.has(Part::LanesLeft) { lanes_left() } else { f64::NAN },
+            off_road_m: if parts.has(Part::OffRoad) { around.scene.map.lane_room_m(place) } else { f64::NAN },
             ..npc
         }
     }
@@ -215,7 +185,7 @@ impl Watched {
 }
 
 /// Stands for a road user that is in no lane beside the route.
-const NO_LANE: i32 = 100;
+const NO_LANE: f64 = 100.0;
 
 struct Lead {
     id: u32,
@@ -352,37 +322,22 @@ mod tests {
     use crate::sim::{Control, Start, testing};
     use std::sync::Arc;
 
-    const ALL: WatchedParts = WatchedParts {
-        lead: true,
-        red: true,
-        stop: true,
-        line: true,
-        oncoming: true,
-        lane: true,
-        jerk: true,
-        crosswalk: true,
-        crosses: true,
-        lanes_left: true,
-        off_road: true,
-        ego_off_road: true,
-    };
-
     #[test]
     fn what_is_ahead_is_watched() {
         let mut world = testing::world(&testing::straight());
         let mut watched = Watched::default();
-        let alone = watched.look(&world, ALL);
+        let alone = watched.look(&world, Parts::ALL);
         assert_eq!((alone.lead_gap_m, alone.lead_speed_mps, alone.lead_since_s), (LEAD_GAP_M_MAX, 0.0, 0.0));
         let request = testing::request(avastra_lang::model::vocabulary::Verb::DriveAhead, 30.0, 4.0);
         world.apply(&crate::action::Effect::Spawn(request)).expect("there is room");
-        let first = watched.look(&world, ALL);
+        let first = watched.look(&world, Parts::ALL);
         assert!((first.lead_gap_m - 30.0).abs() < 1e-6, "{first:?}");
         assert_eq!(first.lead_speed_mps, 4.0);
         for _ in 0..50 {
             world.tick(&Control { throttle_pct: 10.0, ..Control::default() });
-            watched.look(&world, ALL);
+            watched.look(&world, Parts::ALL);
         }
-        let later = watched.look(&world, ALL);
+        let later = watched.look(&world, Parts::ALL);
         assert!((later.lead_since_s - 1.0).abs() < 1e-9, "{later:?}");
         let rear_m = world.npc_facts(1).expect("it is there").rear_m;
         assert!((later.lead_gap_m - (rear_m - world.moment_facts().ego_front_m)).abs() < 1e-9);
@@ -424,7 +379,7 @@ mod tests {
         for tick in 0..900 {
             let steer_rad = [-0.1, 0.1, 0.1, -0.1, 0.1, -0.1].get(tick / 80).copied().unwrap_or(0.0);
             world.tick(&Control { throttle_pct: 25.0, steer_rad, ..Control::default() });
-            let now = watched.look(&world, ALL).crosses;
+            let now = watched.look(&world, Parts::ALL).crosses;
             let corners = world.ego_outline().corners().map(|corner| corner.y);
             let (least_m, most_m) = corners
                 .iter()
@@ -465,7 +420,7 @@ mod tests {
             world.tick(&Control { throttle_pct: 30.0, ..Control::default() });
             let moment = world.moment_facts();
             let wanted_m = if moment.ego_rear_m < end_m { moment.ego_front_m - begin_m } else { -100.0 };
-            let found_m = watched.look(&world, ALL).over_crosswalk_m;
+            let found_m = watched.look(&world, Parts::ALL).over_crosswalk_m;
             assert!((found_m - wanted_m.max(-100.0)).abs() < 1e-9, "{found_m} in place of {wanted_m}");
             most_m = most_m.max(found_m);
         }
@@ -478,13 +433,13 @@ mod tests {
         let mut watched = Watched::default();
         let lane = world.scene().route.lane_at(0.0).lane;
         let half_lane_m = world.scene().map.lane(lane).width_at(0.0) / 2.0;
-        let in_the_middle = watched.look(&world, ALL).over_lane_m;
+        let in_the_middle = watched.look(&world, Parts::ALL).over_lane_m;
         let half_width_m = VehicleParameters::MKZ.width_m / 2.0;
         assert!((in_the_middle - (half_width_m - half_lane_m)).abs() < 1e-9, "{in_the_middle}");
         let mut before_m = in_the_middle;
         for _ in 0..200 {
             world.tick(&Control { throttle_pct: 20.0, steer_rad: 0.02, ..Control::default() });
-            let over_m = watched.look(&world, ALL).over_lane_m;
+            let over_m = watched.look(&world, Parts::ALL).over_lane_m;
             assert!(over_m >= before_m - 1e-9, "it drives to the left all the time");
             before_m = over_m;
         }
@@ -500,7 +455,7 @@ mod tests {
         let mut straddled = 0;
         for _ in 0..3000 {
             world.tick(&Control { throttle_pct: 30.0, ..Control::default() });
-            let found_m = watched.look(&world, ALL).over_stop_m;
+            let found_m = watched.look(&world, Parts::ALL).over_stop_m;
             let facts = world.moment_facts();
             let expected_m = if facts.ego_rear_m >= line_m { FAR_M } else { facts.ego_front_m - line_m };
             assert!((found_m - expected_m.max(FAR_M)).abs() < 1e-9, "{found_m} in place of {expected_m}");
@@ -521,7 +476,7 @@ mod tests {
             let mut straddled = 0;
             for _ in 0..1500 {
                 world.tick(&Control { throttle_pct: 30.0, ..Control::default() });
-                let found_m = watched.look(&world, ALL).over_red_m;
+                let found_m = watched.look(&world, Parts::ALL).over_red_m;
                 let facts = world.moment_facts();
                 if found_m > 0.0 {
                     straddled += 1;

@@ -22,6 +22,7 @@ use avastra_world::sim::{FRAME_S, Scene, SignalColour};
 
 use self::course::Course;
 use self::profile::Leader;
+use self::walker::Walker;
 use super::config::PredictionConfig;
 use super::foresight::Foresight;
 use super::tracking::Track;
@@ -96,8 +97,7 @@ struct Memory {
     /// Speed in the last frame, m/s, and the smoothed change of it, m/s².
     speed_mps: Option<f64>,
     acceleration_mps2: f64,
-    /// How long a pedestrian has stood, s.
-    stood_s: f64,
+    walker: Walker,
     seen: bool,
 }
 
@@ -233,10 +233,8 @@ impl Prediction {
 
     fn predict_walker(&mut self, forecast: Forecast) {
         let index = self.memory_of(forecast.id);
-        let stood_s = &mut self.memories[index].stood_s;
-        *stood_s = if forecast.moving { 0.0 } else { *stood_s + FRAME_S };
         let several = self.config.hypotheses_max > 1;
-        walker::predict(&self.scene.map, forecast, *stood_s, several, &mut self.forecasts);
+        self.memories[index].walker.predict(&self.scene.map, forecast, several, &mut self.forecasts);
     }
 
     fn memory_of(&mut self, id: u32) -> usize {

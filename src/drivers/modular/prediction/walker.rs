@@ -4,9 +4,10 @@
 //! maps; the rule and its figures are ours.
 
 use avastra_base::geometry::{Vec2, unit_vector};
-use avastra_road::RoadMap;
+use avastra_road::{LanePlace, RoadMap};
+use avastra_world::sim::FRAME_S;
 
-use super::{Forecast, STEP_S};
+use super::{FRAME_REACH_M, Forecast, STEP_S};
 
 /// A pedestrian is at the kerb up to this far from the nearest lane's edge, m.
 const KERB_M: f64 = 2.0;
@@ -27,52 +28,81 @@ const PROBABILITY_MIN: f64 = 0.05;
 const SETS_OUT_AFTER_S: f64 = 0.5;
 const WALK_MPS: f64 = 1.3;
 
-/// Adds the hypotheses of a pedestrian who has stood for `stood_s`; `forecast` is the one that keeps its velocity.
-pub fn predict(
-    map: &RoadMap,
-    mut forecast: Forecast,
+/// What is known of a pedestrian from frame to frame.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Walker {
+    /// How long it has stood, s.
     stood_s: f64,
-    several: bool,
-    forecasts: &mut Vec<Forecast>,
-) {
-    let sets_out = sets_out(map, &mut forecast, stood_s).filter(|_| several);
-    if let Some(sets_out) = &sets_out {
-        forecast.probability = 1.0 - sets_out.probability;
-    }
-    forecasts.push(forecast);
-    forecasts.extend(sets_out);
+    /// The lane that it was on, as long as it is on that.
+    on: Option<LanePlace>,
 }
 
-/// The hypothesis that a pedestrian who stands at the kerb sets out. One who walks along the carriageway is made to stay
-/// beside it.
-fn sets_out(map: &RoadMap, forecast: &mut Forecast, stood_s: f64) -> Option<Forecast> {
-    let position = forecast.positions[0];
-    let place = map.nearest(position, forecast.heading_rad, KERB_M)?;
-    let lane = map.lane(place.lane);
-    let along = lane.centre.pose_at(place.station_m).forward();
-    let beyond_m = place.offset_m.abs() - lane.width_at(place.station_m) / 2.0;
-    if beyond_m <= 0.0 {
-        // On the carriageway there is nothing to wait for.
-        return None;
-    }
-    let across = Vec2::new(along.y, -along.x) * place.offset_m.signum();
-    if forecast.moving {
-        let velocity_mps = forecast.velocity_mps;
-        if velocity_mps.dot(&across).abs() < ACROSS_MPS {
-            walk(forecast, along * velocity_mps.dot(&along), 0.0);
+impl Walker {
+    /// Adds the hypotheses of the next frame, if there may be `several`; `forecast` is the one that keeps its velocity.
+    pub fn predict(
+        &mut self,
+        map: &RoadMap,
+        mut forecast: Forecast,
+        several: bool,
+        forecasts: &mut Vec<Forecast>,
+    ) {
+        self.stood_s = if forecast.moving { 0.0 } else { self.stood_s + FRAME_S };
+        let sets_out = self.sets_out(map, &mut forecast, several);
+        if let Some(sets_out) = &sets_out {
+            forecast.probability = 1.0 - sets_out.probability;
         }
-        return None;
+        forecasts.push(forecast);
+        forecasts.extend(sets_out);
     }
-    let facing = unit_vector(forecast.heading_rad).dot(&across) >= FACING_COSINE;
-    let chance = if is_near_crosswalk(map, position) { SETS_OUT_AT_CROSSWALK } else { SETS_OUT };
-    let chance = chance * libm::exp2(-stood_s / WAITED_S);
-    if !facing || chance < PROBABILITY_MIN {
-        return None;
+
+    /// The hypothesis that a pedestrian who stands at the kerb sets out. One who walks along the carriageway is made to stay
+    /// beside it.
+    fn sets_out(&mut self, map: &RoadMap, forecast: &mut Forecast, several: bool) -> Option<Forecast> {
+        let position = forecast.positions[0];
+        let waiting = libm::exp2(-self.stood_s / WAITED_S);
+        let chance_max = SETS_OUT.max(SETS_OUT_AT_CROSSWALK) * waiting;
+        if !forecast.moving && (!several || chance_max < PROBABILITY_MIN) {
+            return None;
+        }
+        // On the carriageway there is nothing to wait for.
+        self.on = self.on.and_then(|place| still_on(map, place, position));
+        if self.on.is_some() {
+            return None;
+        }
+        let place = map.nearest(position, forecast.heading_rad, KERB_M)?;
+        let lane = map.lane(place.lane);
+        if place.offset_m.abs() <= lane.width_at(place.station_m) / 2.0 {
+            self.on = Some(place);
+            return None;
+        }
+        let along = lane.centre.pose_at(place.station_m).forward();
+        let across = Vec2::new(along.y, -along.x) * place.offset_m.signum();
+        if forecast.moving {
+            let velocity_mps = forecast.velocity_mps;
+            if velocity_mps.dot(&across).abs() < ACROSS_MPS {
+                walk(forecast, along * velocity_mps.dot(&along), 0.0);
+            }
+            return None;
+        }
+        let facing = unit_vector(forecast.heading_rad).dot(&across) >= FACING_COSINE;
+        let chance = if is_near_crosswalk(map, position) { SETS_OUT_AT_CROSSWALK } else { SETS_OUT };
+        let chance = chance * waiting;
+        if !facing || chance < PROBABILITY_MIN {
+            return None;
+        }
+        let velocity_mps = across * WALK_MPS;
+        let mut sets_out = Forecast { probability: chance, moving: true, velocity_mps, ..forecast.clone() };
+        walk(&mut sets_out, velocity_mps, SETS_OUT_AFTER_S);
+        Some(sets_out)
     }
-    let velocity_mps = across * WALK_MPS;
-    let mut sets_out = Forecast { probability: chance, moving: true, velocity_mps, ..forecast.clone() };
-    walk(&mut sets_out, velocity_mps, SETS_OUT_AFTER_S);
-    Some(sets_out)
+}
+
+/// The same lane, if a position near is on it.
+fn still_on(map: &RoadMap, place: LanePlace, position: Vec2) -> Option<LanePlace> {
+    let lane = map.lane(place.lane);
+    let found = lane.centre.project_near(position, place.station_m, FRAME_REACH_M);
+    let is_on = found.distance_m <= lane.width_at(found.station_m) / 2.0;
+    is_on.then_some(LanePlace { station_m: found.station_m, offset_m: found.offset_m, ..place })
 }
 
 /// Walks at a velocity from a moment on.
