@@ -414,6 +414,7 @@ fn compare(
         sides[1],
         plural(numbers.len(), "episode")
     ));
+    conditions::ambient_text(&comparison.first).iter().for_each(|text| output.tell(text));
     // Nothing is kept of a comparison, so Ctrl-C ends it at once.
     let stop = AtomicBool::new(false);
     let mut progress = Progress::new(output, comparison.event.noun(), numbers.len() as u64, 0);

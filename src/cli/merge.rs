@@ -33,7 +33,7 @@ use super::campaign::{Cut, Item, Kind, costs};
 use super::error::Failure;
 use super::files::{folder, make, remove, write};
 use super::output::{Output, plural};
-use super::{load, pack, run_directory, shard, timing};
+use super::{cell_times, load, pack, run_directory, shard};
 
 /// Tells a directory of a merge from one of somebody else's. The merge has it locked.
 const MARK: &str = "merge.partial";
@@ -358,7 +358,7 @@ fn publish<C: Cut>(
     }
     let (mut merged, known) = (load::everything_in(partial)?, load::everything_in(out)?);
     // Machines need not have taken the same time.
-    for name in [MARK, timing::FILE] {
+    for name in [MARK, cell_times::FILE] {
         merged.remove(Path::new(name));
     }
     let is_equal = |(name, path): (&PathBuf, &PathBuf)| -> Result<bool, Failure> {

@@ -3,6 +3,8 @@
 mod ads;
 mod arguments;
 mod campaign;
+mod cell_times;
+mod clock;
 mod check;
 mod compile;
 mod completions;
@@ -27,6 +29,7 @@ mod load;
 mod look;
 mod lsp;
 mod merge;
+mod mistyped;
 mod never;
 mod new;
 mod output;
@@ -49,47 +52,17 @@ mod shard;
 mod shrink;
 mod study;
 mod test;
-mod timing;
 mod train;
 mod trials;
 mod why;
 
 use std::process::ExitCode;
 
-use clap::error::{ContextKind, ContextValue};
 use clap::{ArgMatches, FromArgMatches};
-
-use avastra_lang::syntax::nearest;
 
 use arguments::{Arguments, Command, Format};
 use error::Failure;
 use output::Output;
-
-/// An unknown command's error with what it is called now, or else with the command that differs least: clap's own measure
-/// prefers `render` to `run` for `rn`.
-fn with_nearest_command(mut error: clap::Error) -> clap::Error {
-    let is_option =
-        |value: &&ContextValue| matches!(value, ContextValue::String(word) if word.starts_with("--"));
-    let option = error.get(ContextKind::InvalidArg).filter(is_option);
-    if let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand).or(option)
-        && let Some(now) = help::moved(word)
-    {
-        return help::command().error(error.kind(), format!("`{word}` is now `{now}`"));
-    }
-    let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand).cloned() else {
-        return error;
-    };
-    // Words of `ads` have other neighbours.
-    if std::env::args().skip(1).find(|argument| !argument.starts_with('-')).as_ref() != Some(&word) {
-        return error;
-    }
-    let command = help::command();
-    let commands = command.get_subcommands().filter(|command| !command.is_hide_set());
-    if let Some(near) = nearest(&word, commands.map(clap::Command::get_name)) {
-        error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![near.to_owned()]));
-    }
-    error
-}
 
 /// The words of the command that was asked for: `run`, `policy explain`.
 fn words_of(found: &ArgMatches) -> String {
@@ -120,7 +93,7 @@ pub fn main() -> ExitCode {
     let found = match help::command().try_get_matches() {
         Ok(found) => found,
         Err(error) => {
-            let error = with_nearest_command(error);
+            let error = mistyped::with_nearest_command(error);
             // Help and version are not failures; every other message of clap's is a usage error.
             if error.use_stderr() && output::asks_for_json() {
                 let reason = error.to_string();

@@ -12,16 +12,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use avastra_base::outside::in_line;
 use avastra_campaign::train::TrainedEpisode;
 
+use super::clock::now;
 use super::output::{Output, Telling, plural, remark};
-
-/// The time now.
-#[allow(
-    clippy::disallowed_methods,
-    reason = "this is cli, and the time is only told or stands beside results"
-)]
-pub fn now() -> Instant {
-    Instant::now()
-}
 
 /// How far a run or a study is. Dropping it clears the bar.
 pub struct Progress {

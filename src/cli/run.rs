@@ -22,6 +22,7 @@ use avastra_world::action::{ActionTable, Draw};
 
 use super::arguments::RunArguments;
 use super::campaign::{self, Campaign, Cut, Item, Outside, Share, settled};
+use super::clock::now;
 use super::conditions::profile_text;
 use super::error::Failure;
 use super::files::write_answers;
@@ -31,7 +32,6 @@ use super::never::Never;
 use super::output::{Output, for_shell, plural};
 use super::parallel::jobs;
 use super::policy::acting;
-use super::progress::now;
 use super::run_directory::{Player, Resumed};
 use super::{compile, conditions, load, merge, protocol, run_directory, shard};
 
@@ -255,6 +255,7 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<Begun>, Fai
     let settings = settings.started_unless(arguments.shard.dry_run);
     let run = ready(table, settings, policy.as_ref(), face)?;
     if arguments.shard.dry_run {
+        conditions::ambient_text(&run).iter().for_each(|text| output.tell(text));
         let texts = (&*heading(&run), &*plural(run.episodes(), "episode"));
         return shard::planned(output, out, run.settings(), texts, shard).map(|()| None);
     }

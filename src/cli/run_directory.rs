@@ -142,20 +142,17 @@ pub fn resume<C: Campaign>(
 ) -> Result<Resumed<C>, Failure> {
     let Kind { file: kind, what, .. } = C::KIND;
     let path = C::KIND.settings(directory);
-    if let Some(Kind { what: found, command, .. }) =
-        what_was_begun(directory).filter(|found| found.what != what)
-    {
+    if let Some(Kind { command, .. }) = what_was_begun(directory).filter(|found| found.what != what) {
         return Err(Failure::usage(format!(
-            "`{}` holds a {found}: go on with `avastra {command} --resume {}`",
+            "`{}` was begun by `avastra {command}`: go on with `avastra {command} --resume {}`",
             directory.shown(),
             for_shell(directory)
         )));
     }
     if !path.is_file() {
         return Err(Failure::usage(format!(
-            "`{}` is no {kind} directory: it has no {kind}.yaml; begin one with `--out {}`",
-            directory.shown(),
-            for_shell(directory)
+            "`{}` is no {kind} directory: it has no {kind}.yaml; begin one in a new directory with `--out`",
+            directory.shown()
         )));
     }
     let held = hold(directory)?;
@@ -171,6 +168,10 @@ pub fn resume<C: Campaign>(
         )));
     }
     let (mut settings, text) = settings_of::<C>(directory)?;
+    // Whatever else is wrong with edited settings, that they were edited is the reason.
+    if let Some(edited) = lost.is_none().then(|| C::Database::edited(&database, &text)).flatten() {
+        return Err(Failure::file("open", &database, edited));
+    }
     let Outside { space, space_digest, external, .. } = settings.outside();
     let table = load::table(output, &directory.join(space.as_str()))?;
     let meaning = &table.space().meaning;
@@ -662,11 +663,13 @@ fn make_empty(path: &Path) -> Result<Held, Failure> {
     make(path)?;
     let held = hold(path)?;
     if !is_unbegun(path).map_err(|error| Failure::file("read", path, error))? {
-        return Err(Failure::usage(format!(
-            "`{}` is not empty: name a new directory, or go on with `--resume {}`",
-            path.shown(),
-            for_shell(path)
-        )));
+        let go_on = match what_was_begun(path) {
+            Some(Kind { command, .. }) => {
+                format!(", or go on with `avastra {command} --resume {}`", for_shell(path))
+            }
+            None => String::new(),
+        };
+        return Err(Failure::usage(format!("`{}` is not empty: name a new directory{go_on}", path.shown())));
     }
     tidy(path)?;
     Ok(held)

@@ -17,15 +17,15 @@ use avastra_world::action::ActionTable;
 
 use super::arguments::{StudyArguments, StudyCommand};
 use super::campaign::{Campaign, Cut, Item, Kind, Outside, Share, costs, missing, settled};
+use super::cell_times::Times;
+use super::clock::now;
 use super::error::Failure;
 use super::files::{remove, write};
 use super::findings::kinds_text;
 use super::interrupt::stop_on_interrupt;
 use super::output::{Output, for_shell, plural};
 use super::parallel::jobs;
-use super::progress::now;
 use super::run_directory::Resumed;
-use super::timing::Times;
 use super::{load, merge, results, run_directory, shard};
 
 type Directory = run_directory::Directory<StudySettings>;

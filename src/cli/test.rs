@@ -19,6 +19,7 @@ use avastra_lang::syntax::{Diagnostic, Sources};
 use avastra_world::action::ActionTable;
 
 use super::arguments::{FilesArguments, REPLAYS, TestArguments};
+use super::clock::now;
 use super::error::Failure;
 use super::files::{without_links, write_again, write_anew, write_named};
 use super::findings::{is_reproducible, spot_check};
@@ -26,7 +27,6 @@ use super::load::{self, Emitted, answers_path};
 use super::look::{as_it_is_now, is_outdated, meaning_text};
 use super::output::{Output, plural};
 use super::parallel::each_file_in_turn;
-use super::progress::now;
 use super::review::{Change, Now, Review, review};
 use super::run_directory;
 use super::run_directory::what_was_begun;

@@ -23,7 +23,7 @@ agents:
   - {{ name: random, label: again, repeats: 1 }}
 """
 SMALL = "learning_starts: 4\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 4\nrules_leaves: 0\n"
-AGAIN = "begin one with `--out"
+AGAIN = "begin one in a new directory with `--out"
 
 
 def call(arguments, **fault):

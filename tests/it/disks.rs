@@ -113,7 +113,7 @@ fn what_a_kill_left_before_the_beginning_can_be_begun() {
     let out = scratch.text("run");
     std::fs::create_dir_all(scratch.path("run/critical/space")).expect("it is writable");
     std::fs::write(scratch.path("run/run.yaml.partial"), "avastra: 0").expect("it is writable");
-    fails(&["run", "--resume", &out], "it has no run.yaml; begin one with `--out");
+    fails(&["run", "--resume", &out], "it has no run.yaml; begin one in a new directory with `--out");
     assert_eq!(run_into(&out).0, 0);
     let (status, _, stderr) = run_into(&out);
     assert!(status == 1 && stderr.contains("is not empty"), "{stderr}");
@@ -164,14 +164,16 @@ fn a_run_that_was_edited_is_not_gone_on_with() {
         ("episodes: 3", "episodes: 4", "`episodes` was 3"),
         ("seed: 1", "seed: 2", "`seed` was 1"),
         ("ambient: 0", "ambient: 5", "`conditions.ambient` was 0"),
+        ("space_digest: ", "space_digest: a", "edited since it was begun: `conditions.space_digest` was"),
+        ("space: ", "space: other/", "edited since it was begun: `conditions.space` was"),
     ] {
         edit(&settings, from, to);
         fails(&["run", "--resume", &out], what);
         std::fs::write(&settings, &whole).expect("it is writable");
     }
     resumed(&out);
-    fails(&["train", "--resume", &out], "holds a run: go on with `avastra run --resume");
-    fails(&["study", "--resume", &out], "holds a run");
+    fails(&["train", "--resume", &out], "was begun by `avastra run`: go on with `avastra run --resume");
+    fails(&["study", "--resume", &out], "was begun by `avastra run`");
 
     // An episode whose rows were changed is named, counts for nothing, and is played again; one too many is only removed.
     let bytes = std::fs::read(scratch.path("run/run.db")).expect("it is readable");
@@ -248,7 +250,10 @@ fn printed_commands_can_be_pasted() {
     assert_eq!(run_into(&out).0, 0);
     let quoted = format!("'{}'", out.replace('\'', r"'\''"));
     let (status, _, stderr) = run_into(&out);
-    assert!(status == 1 && stderr.contains(&format!("go on with `--resume {quoted}`")), "{stderr}");
+    assert!(
+        status == 1 && stderr.contains(&format!("go on with `avastra run --resume {quoted}`")),
+        "{stderr}"
+    );
     fails(&["train", "--resume", &out], &format!("go on with `avastra run --resume {quoted}`"));
 }
 

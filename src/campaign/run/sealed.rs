@@ -220,7 +220,7 @@ impl Layout {
     }
 
     /// Checks that its pages are sound and its settings those that it was begun with.
-    fn check(&self, connection: &Connection, settings: &str) -> Result<(), DatabaseError> {
+    pub(super) fn check(&self, connection: &Connection, settings: &str) -> Result<(), DatabaseError> {
         let state: String = connection.pragma_query_value(None, "quick_check", |row| row.get(0))?;
         if state != "ok" {
             return Err(DatabaseError::Damaged { what: state });

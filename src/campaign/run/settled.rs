@@ -88,6 +88,14 @@ pub trait Units: Sized {
         Ok((Self::from_connection(connection), damaged))
     }
 
+    /// That these settings are not those with which a file was begun, if so; `None`, too, of a file that cannot be read.
+    fn edited(path: &Path, settings: &str) -> Option<DatabaseError> {
+        let connection = open_file(path, OpenFlags::SQLITE_OPEN_READ_WRITE).ok()?;
+        let is_ours = Self::LAYOUT.is_in(&connection).ok()? && Self::LAYOUT.check_tables(&connection).is_ok();
+        let error = is_ours.then(|| Self::LAYOUT.check(&connection, settings))?.err()?;
+        matches!(error, DatabaseError::Settings { .. }).then_some(error)
+    }
+
     /// The numbers of all units, in order.
     ///
     /// # Errors

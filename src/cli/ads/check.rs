@@ -8,13 +8,13 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use crate::cli::arguments::AdsCheckArguments;
+use crate::cli::clock::now;
 use crate::cli::error::Failure;
 use crate::cli::files::{Scratch, make_way, write_new};
 use crate::cli::findings::cut_off;
 use crate::cli::load;
 use crate::cli::new::SHIPPED;
 use crate::cli::output::Output;
-use crate::cli::progress::now;
 use avastra_campaign::episode::{self, Choice, EpisodeLog};
 use avastra_campaign::run::{Arena, choose};
 use avastra_drivers::Selected;

@@ -3,10 +3,10 @@
 use crate::check::checker::Checker;
 use crate::check::declaration::unknown_word;
 use crate::check::expression::Place;
+use crate::check::mistakes::{Report, field};
 use crate::check::names::docs;
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
-use crate::check::report::{Report, field};
 use crate::model::body::{Changes, parameters};
 use crate::model::vocabulary::{Body, BodyClass, BodyField, Word};
 use crate::model::{BodyDef, BodyWord, Type, WordExpr, code};

@@ -7,9 +7,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::check::mistakes::Report;
 use crate::check::names::{Names, unknown};
 use crate::check::references::{References, Symbol};
-use crate::check::report::Report;
 use crate::check::{style, unused};
 use crate::model::command::Told;
 use crate::model::effort;

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use crate::check::checker::{Checker, Signature, each};
 use crate::check::expression::{NUMBER_MAX, Place, article, is_beyond_states};
+use crate::check::mistakes::{Report, all_of};
 use crate::check::names::docs;
 use crate::check::references::Symbol;
-use crate::check::report::{Report, all_of};
 use crate::check::rule::names_in;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{Level, Phenomenon, ROAD_USER, Site, SpaceClaim, TimeOfDay, Word, WorldState};

@@ -1,7 +1,7 @@
 //! Static claims of a space: `expect count(actions) == 45`, `expect every(actions, realisable)`.
 
 use crate::check::checker::{Checker, Claim, each};
-use crate::check::report::Report;
+use crate::check::mistakes::Report;
 use crate::model::effort;
 use crate::model::vocabulary::{SpaceClaim, Word};
 use crate::model::{Row, Space, code};

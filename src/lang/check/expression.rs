@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 
 use crate::check::checker::Checker;
 use crate::check::declaration::HEIGHT_MAX;
+use crate::check::mistakes::Report;
 use crate::check::names::unknown;
 use crate::check::operator::Sides;
 use crate::check::references::Symbol;
-use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind, Who};
 use crate::model::vocabulary::{
     BEGINS, Fact, Known, NearWord, NumberWord, PastWord, ROAD_LANES, SINCE, Site, THERE, Word, WordFact,

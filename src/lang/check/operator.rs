@@ -5,9 +5,9 @@ use crate::check::checker::Checker;
 use crate::check::expression::{
     Place, SEEN_BY, article, dimension, fits, is_number, unit_help, unknown_here,
 };
+use crate::check::mistakes::{Report, all_of};
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
-use crate::check::report::{Report, all_of};
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Who};
 use crate::model::vocabulary::{Known, LaneChoice, Site, Word, WordFact};
 use crate::model::{BodyWord, Type, code};

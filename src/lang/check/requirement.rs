@@ -2,10 +2,10 @@
 
 use crate::check::checker::{Checker, Required};
 use crate::check::expression::Place;
+use crate::check::mistakes::{Report, with_value};
 use crate::check::names::docs;
 use crate::check::names::flat;
 use crate::check::references::Symbol;
-use crate::check::report::{Report, with_value};
 use crate::model::expr::{Comparison, Expr, ExprKind};
 use crate::model::requirement::{margin_dimension, open_divisor, past_inside};
 use crate::model::vocabulary::{BEGINS, BREACHED, EVENTS, MARGIN, NearWord, PastWord, Site, Word, things};

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use crate::check::checker::{Checker, Maps};
 use crate::check::expression::{Place, number_help};
+use crate::check::mistakes::{Report, all_of, field};
 use crate::check::names::docs;
 use crate::check::names::unknown;
-use crate::check::report::{Report, all_of, field};
 use crate::model::vocabulary::{RoadField, Word};
 use crate::model::{
     Road, RoadFacts, SIGNAL_PHASE_S, SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, SignalProgram, Type, code,

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use crate::check::checker::{Checker, Doers};
 use crate::check::expression::{Place, enum_of};
+use crate::check::mistakes::Report;
 use crate::check::names::docs;
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
-use crate::check::report::Report;
 use crate::check::spawn::possible;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::states_read;

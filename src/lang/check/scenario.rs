@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use core::ops::{Range, RangeInclusive};
 
+use crate::check::mistakes::Report;
 use crate::check::names::docs;
 use crate::check::names::unknown;
-use crate::check::report::Report;
 use crate::check::scenario_condition::condition;
 use crate::check::scenario_rules::{Moment, breaches, broken_start};
 use crate::check::scenario_value::{number, value};

@@ -1,7 +1,7 @@
 //! What a scenario claims of its replay: `expect collision with npc#2 at 14.22 s`, `expect end == arrived`.
 
+use crate::check::mistakes::Report;
 use crate::check::names::unknown;
-use crate::check::report::Report;
 use crate::check::scenario::Reader;
 use crate::check::scenario_value::figure;
 use crate::model::code;

@@ -2,8 +2,8 @@
 
 use crate::check::checker::{Checker, each};
 use crate::check::expression::Place;
+use crate::check::mistakes::{Report, with_value};
 use crate::check::names::docs;
-use crate::check::report::{Report, with_value};
 use crate::check::rule::names_in;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{EpisodeField, Fact, Site, StopReason, Word};

@@ -2,9 +2,10 @@
 
 use crate::check::checker::Checker;
 use crate::check::expression::Place;
-use crate::check::report::{Report, as_written, field};
-use crate::model::command::CommandDef;
+use crate::check::mistakes::{Report, as_written, field};
+use crate::model::command::{CommandDef, Told};
 use crate::model::expr::{Expr, ExprKind};
+use crate::model::field::Kind;
 use crate::model::vocabulary::{Colour, Field, LaneChoice, Side, Then, Verb, Word};
 use crate::model::{BodyWord, EffectDef, InRow, ManoeuvreCall, SpawnDef, Type, WordExpr, code};
 use crate::syntax::ast::Span;
@@ -24,29 +25,17 @@ const fn idle(field: Field, is_idle: fn(Verb) -> bool, what: &'static str, help:
     IdleField { field, is_idle, what, help }
 }
 
-/// A field that means nothing for several reasons has a row for each; the first one counts.
-const IDLE_FIELDS: [IdleField; 13] = {
+/// Fields that mean nothing to some verbs, each for a reason of its own. Of the others, nobody has a use for what it can never be
+/// told.
+const IDLE_FIELDS: [IdleField; 6] = {
     const FOLLOWS: fn(Verb) -> bool = |verb| verb == Verb::Follow;
-    const ON_FOOT: fn(Verb) -> bool = |verb| verb.is_on_foot();
     const WALKS: fn(Verb) -> bool = |verb| verb == Verb::Walk;
     const NO_WALK: fn(Verb) -> bool = |verb| verb != Verb::Walk;
     const NO_CROSSING: fn(Verb) -> bool = |verb| verb != Verb::CrossRoad;
-    use Field::{Early, Ignores, Lane, Lights, Meet, Offset, Side, Siren, Turn, Waits};
+    use Field::{Early, Lane, Meet, Offset, Side, Waits};
     [
-        idle(
-            Ignores,
-            FOLLOWS,
-            "minds nobody",
-            "it follows its trajectory whatever comes; leave `ignores` out",
-        ),
-        idle(Siren, FOLLOWS, "has no driver", "leave `siren` out"),
-        idle(Turn, FOLLOWS, "has no driver", "leave `turn` out"),
         idle(Lane, FOLLOWS, "begins on its trajectory", "leave `lane` out"),
         idle(Side, FOLLOWS, "begins on its trajectory", "leave `side` out"),
-        idle(Ignores, ON_FOOT, "ignores nothing", "rules of the road are for vehicles; leave `ignores` out"),
-        idle(Siren, ON_FOOT, "has no siren", "leave `siren` out"),
-        idle(Lights, ON_FOOT, "has no lights", "leave `lights` out"),
-        idle(Turn, ON_FOOT, "drives through no junction", "leave `turn` out"),
         idle(Offset, WALKS, "begins at the kerb", "leave `offset` out"),
         idle(Meet, NO_WALK, "is met at no point of the ego vehicle", "`meet` is for `Walk`; leave it out"),
         idle(Waits, NO_WALK, "waits at no kerb", "`waits` is for `Walk`; leave it out"),
@@ -58,6 +47,17 @@ const IDLE_FIELDS: [IdleField; 13] = {
         ),
     ]
 };
+
+/// Whether nobody who does that can ever be told this: `what` and a help in words.
+fn never_told(field: Field, verb: Verb) -> Option<(String, String)> {
+    let is_checked = matches!(field.kind(), Kind::Own) || IDLE_FIELDS.iter().any(|idle| idle.field == field);
+    if is_checked || field == Field::Speed || Told::to(verb).holds(field) {
+        return None;
+    }
+    let name = field.name();
+    let why = if verb.is_on_foot() { "it is on foot" } else { "it follows a trajectory" };
+    Some((format!("has no use for `{name}`"), format!("leave `{name}` out: {why}")))
+}
 
 impl Checker {
     /// What one `spawn` makes appear: a road user, or several if it is a row.
@@ -295,14 +295,16 @@ impl Checker {
     /// Reports fields that mean nothing to a verb.
     fn check_fields(&mut self, fields: &[(Field, &ast::Expr)], verb: &WordExpr<Verb>) {
         let verbs = possible(verb);
-        let reason = |field: Field| {
-            let mut reasons = IDLE_FIELDS.into_iter().filter(|idle| idle.field == field);
-            reasons.find_map(|idle| Some((verbs.iter().find(|verb| (idle.is_idle)(**verb))?, idle)))
+        let reason = |field: Field, verb: Verb| {
+            let idle = IDLE_FIELDS.iter().find(|idle| idle.field == field && (idle.is_idle)(verb));
+            let idle = idle.map(|idle| (idle.what.to_owned(), idle.help.to_owned()));
+            idle.or_else(|| never_told(field, verb))
         };
+        let reason = |field: Field| verbs.iter().find_map(|verb| Some((verb.name(), reason(field, *verb)?)));
         for (field, value) in fields {
-            let Some((verb, idle)) = reason(*field) else { continue };
-            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, format!("`{}` {}", verb.name(), idle.what));
-            self.report(error.at(value.span, "without effect").help(idle.help));
+            let Some((verb, (what, help))) = reason(*field) else { continue };
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, format!("`{verb}` {what}"));
+            self.report(error.at(value.span, "without effect").help(help));
         }
         let said = |wanted: Field| field(fields, wanted).filter(|_| reason(wanted).is_none());
         if let (Some(_), Some(waits)) = (said(Field::Meet), said(Field::Waits)) {

@@ -3,9 +3,9 @@
 
 use std::collections::BTreeSet;
 
+use crate::check::mistakes::Report;
 use crate::check::names::unknown;
 use crate::check::policy::value_of;
-use crate::check::report::Report;
 use crate::check::scenario::Reader;
 use crate::model::{Memory, NoStart, Road, RulesInForce, Space};
 use crate::syntax::ast::Field;

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use crate::check::checker::Checker;
 use crate::check::checker::Maps;
 use crate::check::expression::Place;
+use crate::check::mistakes::{Report, all_of, field};
 use crate::check::names::docs;
 use crate::check::references::Symbol;
-use crate::check::report::{Report, all_of, field};
 use crate::model::vocabulary::{PointField, TrajectoryField, Word};
 use crate::model::{
     BesideRoute, Laid, Road, Trajectory, TrajectoryDef, Type, WayPoint, WordExpr, code, through,

@@ -66,8 +66,8 @@ pub fn place(
     if !may_use(around.scene, lane, request.body, request.ignores()) {
         return Err("that lane is for buses".into());
     }
-    driver.begin_at(request.offset_m(), request.ignores());
-    driver.has_siren = request.has_siren();
+    driver.begin_at(request.offset_m());
+    driver.heed(&request.told);
     check_way(around, &driver, &size)?;
     let moved = driver.moved(&size);
     Ok(Newcomers { asked: finish(&asked, Motion::Drive(driver), moved)?, cover: None })

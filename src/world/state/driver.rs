@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use avastra_base::geometry::{Chord, Pose, Vec2, unit_vector};
 use avastra_lang::model::body::BodyParameters;
-use avastra_lang::model::field::IgnoredRules;
+use avastra_lang::model::field::{Fields, IgnoredRules, Said};
 use avastra_lang::model::vocabulary::{Side, Turning};
 use avastra_road::LaneIndex;
 
@@ -209,10 +209,15 @@ impl Driver {
     }
 
     /// It begins so far to the left of the middle of its lane, m, and ignores these rules of the road.
-    pub fn begin_at(&mut self, left_m: f64, ignores: IgnoredRules) {
+    pub fn begin_at(&mut self, left_m: f64) {
         let aside = || Box::new(Aside { wanted_m: left_m, now_m: left_m, ..Aside::default() });
         self.aside = (left_m != 0.0).then(aside);
-        self.ignores = ignores;
+    }
+
+    /// What it is from now on, by its spawn or an order.
+    pub fn heed(&mut self, told: &Fields<Said>) {
+        self.ignores = told.ignores().unwrap_or(self.ignores);
+        self.has_siren = told.siren().unwrap_or(self.has_siren);
     }
 
     /// How far to the left of the middle of its lane it is, m.

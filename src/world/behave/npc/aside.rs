@@ -31,8 +31,7 @@ impl Driver {
             self.pursuit = None;
         }
         self.time_gap_s = command.time_gap_s().unwrap_or(self.time_gap_s);
-        self.ignores = command.ignores().unwrap_or(self.ignores);
-        self.has_siren = command.siren().unwrap_or(self.has_siren);
+        self.heed(command);
         command.turn().iter().for_each(|to| self.mean_to_turn(*to, None));
         if command.goes_aside() {
             self.plan.clear();
