@@ -27,6 +27,7 @@ mod imports;
 mod json;
 mod language;
 mod layers;
+mod learners;
 mod links;
 mod manoeuvres;
 mod maps;
