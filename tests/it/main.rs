@@ -35,6 +35,7 @@ mod motorway;
 mod pedestrians;
 mod policies;
 mod profiles;
+mod prose;
 mod protocols;
 mod r157;
 mod references;
