@@ -42,6 +42,7 @@ fn rows(page: &str) -> Vec<Vec<&str>> {
 }
 
 #[test]
+#[expect(clippy::disallowed_methods, reason = "a test may ask whether snapshots are to be written")]
 fn the_page_of_learners_has_each_setting_and_each_value() {
     let page = std::fs::read_to_string(PAGE).expect("it is there");
     let rows = rows(&page);
