@@ -1,8 +1,9 @@
 //! Texts from outside: what programs say, what files hold that others wrote, and file names. Each place where such a text may
 //! stand has one function here, named for the place.
 //!
-//! A text from outside may try to end the place that it stands in: a line break ends a comment or a line of a terminal, `"` a cell
-//! of CSV, `<` a text of a page. What a function here returns cannot. `tests/it/layers.rs` keeps paths from being printed otherwise.
+//! A text from outside may try to end the place that it stands in. A line break ends a comment or a line of a terminal, `"`
+//! a cell of CSV, `<` a text of a page. The texts that the functions here return cannot. `tests/it/layers.rs` keeps paths
+//! from being printed otherwise.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -25,7 +26,8 @@ fn acts_on_line(character: char) -> bool {
 }
 
 /// Lines for a terminal, whose breaks are ours: characters that would act on the terminal are written as their numbers
-/// (`\u{1b}`), and commands to continuous integration are broken up. What is from outside in them went through [`in_line`] before.
+/// (`\u{1b}`), and commands to continuous integration are broken up. Texts from outside in these lines went through
+/// [`in_line`] before.
 pub fn on_terminal(text: &str) -> Cow<'_, str> {
     let lines = text.split('\n').map(|line| match line.strip_suffix('\r') {
         // Windows ends lines so.
@@ -39,13 +41,13 @@ pub fn on_terminal(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// A text within a line that is printed or logged: line breaks and other control characters are written as escapes (`\n`,
+/// A text within a line that is printed or logged. Line breaks and other control characters are written as escapes (`\n`,
 /// `\u{1b}`), and commands to continuous integration are broken up.
 pub fn in_line(text: &str) -> Cow<'_, str> {
     escaped(text, acts_on_line)
 }
 
-/// What Azure Pipelines and older runners of GitHub obey wherever it stands in a line.
+/// Command prefixes that Azure Pipelines and older runners of GitHub obey anywhere in a line.
 const COMMANDS: [&str; 2] = ["##[", "##vso["];
 
 fn escaped(text: &str, acts: fn(char) -> bool) -> Cow<'_, str> {
@@ -69,7 +71,7 @@ fn escaped(text: &str, acts: fn(char) -> bool) -> Cow<'_, str> {
     Cow::Owned(line)
 }
 
-/// JSON that is printed, which holds any text in its strings: what is a command to continuous integration anywhere in a line is
+/// JSON that is printed, which holds any text in its strings. A command to continuous integration anywhere in a line is
 /// written with an escape, which means the same.
 pub fn json_on_terminal(json: &str) -> String {
     json.replace("##", r"#\u0023")
@@ -143,7 +145,7 @@ impl fmt::Display for ShownPath<'_> {
 mod tests {
     use super::*;
 
-    /// What ends a line, turns it, or begins a command of continuous integration.
+    /// Characters that end a line, turn it, or begin a command of continuous integration.
     const HOSTILE: &str = "x\nrequire injected: ego.speed <= 1 m/s\n///\r\u{85}\u{2028}\u{2029}\u{b}\u{c}\u{202e}\u{1b}[2J\t##vso[task] */";
 
     #[test]

@@ -1,9 +1,9 @@
 //! Randomness: one seed, one named stream per consumer.
 //!
-//! Every consumer draws from a stream of its own, so that a new draw in one place shifts no other
-//! and a replay needs nothing but the seed. The generator is named (ChaCha8), because `StdRng` may
-//! change between releases, and the draws are written here, because the distributions of `rand` may
-//! change too: a draw is part of the file format.
+//! Every consumer draws from a separate stream. So a new draw in one place shifts no other, and a replay
+//! needs nothing but the seed. The generator is named (ChaCha8), because `StdRng` may change between
+//! releases. The draws are written here, because the distributions of `rand` may change too: a draw is part
+//! of the file format.
 
 use rand::Rng as _;
 use rand::SeedableRng;
@@ -11,7 +11,7 @@ use rand::SeedableRng;
 /// The one generator of avastra.
 pub type Rng = rand_chacha::ChaCha8Rng;
 
-/// What a stream is for. The discriminant is part of every replay: never renumber, only add.
+/// The consumer of a stream. The discriminant is part of every replay: never renumber, only add.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Stream {
@@ -41,7 +41,7 @@ pub enum Stream {
     Replay = 22,
     /// Seeds of the episodes that a trained policy is judged by.
     Evaluation = 23,
-    /// What a search tries next.
+    /// The next trial of a search.
     Search = 25,
     /// Seeds of the trainings of a study, one index each.
     StudyTraining = 31,
@@ -55,7 +55,7 @@ pub enum Stream {
     Permutation = 42,
     /// Seeds of the parts of an estimate.
     Estimate = 51,
-    /// What a file of another tool lets chance choose; one index for each parameter.
+    /// Values that a file of another tool leaves to chance; one index for each parameter.
     Import = 61,
 }
 

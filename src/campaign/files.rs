@@ -6,7 +6,7 @@
 //! - A folder of ours inside a directory is used only if it is a folder and no link.
 //! - A name that a database or a file gives must be a [`PlainName`]; otherwise the database or the file is refused.
 //! - Where the user named a place to read, nothing is written beside it or in it if a folder on the way there is a link
-//!   ([`without_links`]): what leads out of a clone was not named as a place to write.
+//!   ([`without_links`]). The user did not name a path that leads out of a clone as a place to write.
 //!
 //! Only a path that the user named to be written (`--out`, `--resume`) is followed wherever it leads ([`write_named`], [`make`]).
 //! A file that is to be changed (`fmt`, `check --fix`) is between the two: it may be a link itself, on the way to it there is none.
@@ -30,8 +30,9 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use sha2::{Digest, Sha256};
 
-// What needs no care: `make` makes a folder that the user named, with those on the way to it; `make_new` makes a folder where
-// nothing is; `rename` gives a folder a name that nothing has, or an empty folder; `remove_empty` removes an empty one.
+// These need no care. `make` makes a folder that the user named, with those on the way to it. `make_new` makes a folder
+// where nothing is. `rename` gives a folder a name that nothing has, or that of an empty folder. `remove_empty` removes
+// an empty folder.
 pub use std::fs::{create_dir as make_new, create_dir_all as make, remove_dir as remove_empty, rename};
 
 /// Longest name of a file that common file systems take, in bytes.
@@ -267,7 +268,7 @@ pub fn write_anew(path: &Path, bytes: &[u8]) -> Result<()> {
 /// Writes a file anew. Where another file in its place would be less than it was, because it has further names or another owner,
 /// the file itself is written: then a kill can leave it half written.
 fn write_over(path: &Path, found: &Metadata, bytes: &[u8]) -> Result<()> {
-    // Whoever administers a system may write it all the same.
+    // An administrator of the system may write it all the same.
     if found.permissions().readonly() {
         return Err(Error::other("it is read-only"));
     }
@@ -493,7 +494,7 @@ pub fn sweep_all(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Sweeps a folder if this process has not done so yet. What cannot be removed stays: nothing rests on it.
+/// Sweeps a folder if this process has not done so yet. A file that cannot be removed stays: nothing rests on it.
 fn sweep_once(folder: &Path) {
     static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
     let is_new = SWEPT.lock().is_ok_and(|mut swept| swept.insert(folder.to_owned()));

@@ -1,7 +1,7 @@
 //! Episodes, what is judged of them, and the campaigns that are made of many.
 //!
-//! [`episode`] plays one; [`oracle`] judges its collisions; [`run`], [`train`], [`study`], [`estimate`] and [`trial`] play
-//! many and keep them in a database; [`emit`] writes what they find as files of the language; [`files`] alone creates,
+//! [`episode`] plays one. [`oracle`] judges its collisions. [`run`], [`train`], [`study`], [`estimate`] and [`trial`] play
+//! many and keep them in a database. [`emit`] writes what they find as files of the language. [`files`] alone creates,
 //! replaces and removes files.
 //!
 //! ```

@@ -1,6 +1,6 @@
-//! What a run, a training, a study and an estimate have in common: a directory with settings, a database of units, and
-//! scenarios that were written of them. Each says in its own file what it is; `run_directory` begins and resumes all of them,
-//! and `merge` brings the shards of all together that can be cut.
+//! The common part of a run, a training, a study and an estimate: a directory with settings, a database of units, and the
+//! scenarios written of them. Each of the four is defined in its own file. `run_directory` begins and resumes all of them.
+//! `merge` brings their shards together, for the kinds that can be cut.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -29,7 +29,7 @@ pub const KINDS: [Kind; 4] =
 
 /// A kind of campaign.
 pub struct Kind {
-    /// What was begun, in a word.
+    /// The noun for the campaign, in a word.
     pub what: &'static str,
     /// The command that begins it and goes on with it.
     pub command: &'static str,
@@ -65,7 +65,7 @@ pub trait Campaign: Serialize + DeserializeOwned {
     const KIND: Kind;
     type Database: Units;
 
-    /// What the settings name outside of the directory.
+    /// The files outside of the directory that the settings name.
     fn outside(&mut self) -> Outside<'_>;
 
     /// These settings; for a dry run with an external driving system that is not started.
@@ -75,7 +75,7 @@ pub trait Campaign: Serialize + DeserializeOwned {
     }
 }
 
-/// What settings name outside of their directory, by paths from there.
+/// The files outside of their directory that settings name, by paths from there.
 pub struct Outside<'a> {
     pub space: &'a mut String,
     pub space_digest: &'a str,
@@ -103,7 +103,7 @@ pub trait Cut: Campaign {
     fn conclude(output: &Output, directory: &Path) -> Result<(), Failure>;
 }
 
-/// What a shard has as a whole, or not at all.
+/// A piece of work that a shard has as a whole, or not at all.
 pub struct Item {
     /// Its cost in episodes.
     pub cost: u64,
@@ -123,7 +123,7 @@ pub fn costs(work: &[Item]) -> Vec<u64> {
     work.iter().map(|item| item.cost).collect()
 }
 
-/// What a directory has to play. Items go by their positions in the work of the whole.
+/// The work that a directory has to play. Items go by their positions in the work of the whole.
 pub struct Share {
     pub shard: Shard,
     /// The items of its shard, rising.
@@ -152,7 +152,7 @@ impl Share {
         Progress::new(output, how, all, all - episodes(lacking))
     }
 
-    /// What comes after playing: how to go on if something is left, and how to bring shards together.
+    /// Says the next step after playing: how to go on if something is left, and how to bring shards together.
     pub fn end<C: Cut>(
         &self,
         output: &Output,

@@ -24,7 +24,7 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
     let mut files = Vec::new();
     let (mut unread, mut failed) = (Vec::new(), Vec::new());
     let mut scenes = Scenes::default();
-    // What was found of the space of the file before: most often it is that of this one, too.
+    // The warnings about the previous file's space. Most often this file has the same space.
     let mut warned: Option<(Arc<Space>, Vec<Diagnostic>)> = None;
     for path in &arguments.files {
         let mut loaded = match load::read_and_check(path) {

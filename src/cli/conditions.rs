@@ -46,8 +46,8 @@ pub fn ambient_text(run: &Run) -> Option<String> {
     })
 }
 
-/// What the profile of the driving system changes, for a heading; nothing if it is the default. The settings have it, so a
-/// command that goes on says it, too.
+/// The changes in the driving system's profile, for a heading; empty if it is the default. The settings have the profile, so
+/// a resumed command says it, too.
 pub fn profile_text(profile: Option<&Profile>) -> String {
     let line = profile.map(|profile| profile.settings.to_line());
     line.filter(|line| !line.is_empty()).map_or_else(String::new, |line| format!(" with {line}"))

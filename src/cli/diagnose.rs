@@ -110,12 +110,12 @@ impl Case<'_> {
     }
 }
 
-/// What was found about one file.
+/// The diagnosis of one file.
 struct Explained {
     file: PathBuf,
     scenario: String,
     ads: &'static str,
-    /// What was found, in words and in JSON.
+    /// The finding, in words and in JSON.
     heading: String,
     what: serde_json::Value,
     diagnosis: Diagnosis,
@@ -140,8 +140,8 @@ impl Explained {
         if names.is_empty() { "none".to_owned() } else { names.join(joint(self.diagnosis.verdict)) }
     }
 
-    /// The smallest change that removes the finding, told apart from chance: a weakness that is switched off, or else modules
-    /// that are as in the baseline or without errors.
+    /// The smallest change that removes the finding, told apart from chance. The change is a weakness that is switched
+    /// off, or else modules that are as in the baseline or without errors.
     fn cure(&self) -> String {
         let change = match (self.diagnosis.weakness, self.diagnosis.verdict) {
             (Some(weakness), _) => return format!("without `{weakness}`"),
@@ -154,7 +154,7 @@ impl Explained {
     }
 }
 
-/// What stands between the names of several modules: two prevent the collision together, or they are not told apart.
+/// The word between the names of several modules: two prevent the collision together, or they are not told apart.
 fn joint(verdict: Verdict) -> &'static str {
     if verdict == Verdict::Together { " and " } else { " or " }
 }
@@ -233,7 +233,7 @@ fn percent_text(share: &Estimate) -> String {
     format!("{:>4.0} %{interval}", percent(share.mean))
 }
 
-/// What was found, in words and in JSON.
+/// The finding, in words and in JSON.
 fn told(table: &ActionTable, log: &EpisodeLog, found: Found) -> (String, serde_json::Value) {
     match found {
         Found::Collision(index) => {
@@ -398,8 +398,8 @@ fn mended_text(cause: &[Module], changed: &str, noun: &str) -> String {
     format!("with {one} {changed} there is no {noun}, and the replays do not tell them apart")
 }
 
-/// That a module which crashes by what differs from the baseline crashes without any errors as well: the collision hangs
-/// on how it errs, and not on how much.
+/// Says which modules at fault crash without any errors as well. For them, the collision depends on how the module errs, and
+/// not on how much.
 fn perfect_text(evidence: &Evidence, cause: &[Module]) -> String {
     let crashes = |found: &&ModuleFinding| matches!(found.idealised, Fate::Same | Fate::Other);
     let found = evidence.modules.iter().filter(|found| cause.contains(&found.module)).filter(crashes);

@@ -81,7 +81,7 @@ fn page(space: &Space) -> String {
     text
 }
 
-/// How a state begins: one word for all its keys if they begin alike.
+/// The initial value of a state: one word for all its keys if they have the same.
 fn begins(space: &Space, state: &StateDef) -> String {
     let memory = space.initial_memory(0);
     let values = state.initial.iter().zip(&memory.cells()[state.first_cell..]);
@@ -142,7 +142,7 @@ fn rule_section(text: &mut String, space: &Space, index: usize, rule: &RuleDef) 
     }
 }
 
-/// What the rules leave of a parameter's range, for each road on which they narrow it.
+/// The part of a parameter's range that the rules leave, for each road on which they narrow it.
 fn ranges(space: &Space, action: usize, parameter: &Parameter) -> String {
     let Domain::Range(low, high) = &parameter.domain else { return String::new() };
     let declared = Interval::closed(*low, *high);
@@ -212,8 +212,8 @@ fn cell(text: &str) -> String {
     tagless(text).replace('|', "\\|")
 }
 
-/// A text in which no tag of HTML begins and no link leads to a program: Markdown passes both through, and a space may come
-/// from elsewhere.
+/// A text in which no HTML tag begins and no link leads to a program. Markdown passes both through, and the space may come
+/// from another author.
 fn tagless(text: &str) -> String {
     let begins_tag = |next: char| next.is_ascii_alphabetic() || matches!(next, '/' | '!' | '?');
     let mut safe = String::with_capacity(text.len());

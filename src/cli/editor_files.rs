@@ -1,5 +1,5 @@
-//! `avastra editor-files`: the parts of the VS Code extension (`editors/vscode`) that follow from the language: a
-//! TextMate grammar with its words, and the rules for its brackets and comments.
+//! `avastra editor-files`: the parts of the VS Code extension (`editors/vscode`) that follow from the language. They are
+//! a TextMate grammar with its words, and the rules for its brackets and comments.
 //!
 //! A test compares what is shipped with what would be written.
 

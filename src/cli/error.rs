@@ -27,7 +27,7 @@ pub enum Failure {
     },
     #[error("requirements were breached in {count}", count = super::output::plural(*episodes, "episode"))]
     Breach { episodes: usize },
-    /// A driving system of one's own is not the one that was begun with.
+    /// The external driving system is not the one that the campaign was begun with.
     #[error("{message}")]
     OtherProgram { message: String },
     /// A scenario whose space means something else now. The diagnostic is on stderr already.
@@ -76,7 +76,7 @@ impl Failure {
             Failure::Refuted { .. } => 3,
             Failure::Collision { .. } | Failure::Breach { .. } | Failure::Failing { .. } => 4,
             Failure::Ads { .. } | Failure::Unreached { .. } => 5,
-            // What a shell reports for a process that SIGINT ended.
+            // A shell reports this status for a process that SIGINT ended.
             Failure::Stopped | Failure::Interrupted { .. } => 130,
         }
     }

@@ -110,8 +110,8 @@ fn play_all(
     let all = estimate.settings().all_parts();
     let lacking = share.lacking(estimate.settings(), &directory)?;
     let mut progress = share.progress(output, estimate.settings().event.noun(), &lacking);
-    // A shard cannot know when all of them together are precise enough: it plays all of its parts, and the looks are taken
-    // when they are merged.
+    // A shard cannot know when all shards together are precise enough. It plays all of its parts, and the looks are taken
+    // by the merge.
     let looks = match share.shard.is_whole() {
         true => estimate.settings().looks(),
         false => vec![estimate.settings().parts],
@@ -305,7 +305,7 @@ fn is_started(estimate: &Estimate) -> bool {
     estimate.run().arena().program().is_none_or(|program| program.can_start())
 }
 
-/// What the pilot of an estimate saw: kept, or played now. `None` if it was stopped; nothing for a method without one.
+/// The results of an estimate's pilot: kept, or played now. `None` if it was stopped; empty for a method without a pilot.
 fn piloted(
     output: &Output,
     estimate: &Estimate,
@@ -331,8 +331,8 @@ fn piloted(
     Ok(found)
 }
 
-/// Writes what a part met as scenarios, where the space's verdict counts it; name and text of the file of each event, if
-/// there is one.
+/// Writes the events of a part as scenarios, where the space's verdict counts them. Returns the name and text of each
+/// event's file, if it has one.
 fn write_scenarios(
     estimate: &Estimate,
     directory: &Path,
@@ -342,7 +342,7 @@ fn write_scenarios(
     let player = Player { command: "estimate", table: estimate.run().table(), agent, conditions };
     let critical = directory.join("critical");
     let write_one = |met: &Met| {
-        // Of breaches there is a scenario only where they are asked for.
+        // A breach gets a scenario only if the estimate asks for breaches.
         let breach = estimate.settings().event.first_breach(estimate.run().table().space(), &met.log);
         if met.summary.counted() == 0 && breach.is_none() {
             return Ok(None);
@@ -362,7 +362,7 @@ fn write_scenarios(
     played.met.iter().map(write_one).collect()
 }
 
-/// What the command line asks for.
+/// The estimate and the shard that the command line asks for.
 fn wanted(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, Shard), Failure> {
     let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
     let table = load::table(output, file)?;

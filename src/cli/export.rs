@@ -49,7 +49,7 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
                 });
             }
         };
-        // Of what does not happen as it is written, no other tool is told; whoever looks for the reason needs the table.
+        // A scenario with refused actions is exported only as a CSV table, to look for the reason.
         if !recording.refused.is_empty() && arguments.to != ExportFormat::Csv {
             let written = Err(format!("it does not replay: {}", recording.refused.join("; ")));
             return Ok(Exported { file: file.clone(), written, left_out: Vec::new(), refused: Vec::new() });
@@ -90,13 +90,13 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
     refutation(refuted)
 }
 
-/// What came of one file: the files that were written, or why it does not replay.
+/// The result for one file: the files that were written, or why it does not replay.
 struct Exported {
     file: PathBuf,
     written: Result<Vec<PathBuf>, String>,
-    /// What its player cannot be told.
+    /// The parts of the scenario that its format cannot express.
     left_out: Vec<String>,
-    /// What does not happen in it, though it is written.
+    /// The written actions that do not happen.
     refused: Vec<String>,
 }
 
@@ -151,8 +151,8 @@ fn extension(format: ExportFormat) -> &'static str {
     }
 }
 
-/// Writes the file of a scenario and what it needs beside it; the paths of all of them, its own first, and what is left out.
-/// Scenarios share `maps`, so that two of them do not write the same map at once.
+/// Writes the file of a scenario, and the files that it needs beside it. Returns all paths, the scenario's own first, and
+/// the parts left out. Scenarios share `maps`, so that two of them do not write the same map at once.
 fn write_all(
     arguments: &ExportArguments,
     recording: &Recording,
@@ -204,7 +204,7 @@ fn style(arguments: &ExportArguments) -> export::Style {
     export::Style { version, ego, others }
 }
 
-/// What a file calls the map that lies beside it.
+/// The name by which a file refers to the map beside it.
 pub fn map_name(map: &Path) -> Result<&str, Failure> {
     map.file_name().and_then(|name| name.to_str()).ok_or_else(|| {
         Failure::usage(format!(

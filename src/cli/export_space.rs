@@ -75,7 +75,7 @@ fn one(
 ) -> Result<SpaceFiles, Failure> {
     let table = load::table(output, file)?;
     let roads = roads_or_all(&[], table.space());
-    // Nobody drives: the driving system is what is tested with the files.
+    // The arena's driving system never drives: the files are for testing another one.
     let ads = driving_system("modular")?;
     let arena = Arena::new(table, &roads, ads, &[], &[])?;
     let place = target(file, arguments.out.as_ref(), FOLDER, "xosc")?;

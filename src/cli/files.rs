@@ -11,8 +11,8 @@ use avastra_drivers::external;
 use super::error::Failure;
 use super::load::{self, answers_path};
 
-/// Refuses a file by its name before work begins, so that nobody's scenario or database is written over by mistake. A pipe
-/// or a device may have any name.
+/// Refuses a file by its name before work begins, so that no scenario or database is overwritten by mistake. A pipe or a
+/// device may have any name.
 pub fn must_end_in(path: &Path, extension: &str) -> Result<(), Failure> {
     let is_device = path.exists() && !path.is_file();
     if is_device || path.extension().is_some_and(|found| found == extension) {
@@ -51,7 +51,7 @@ pub fn without_links(path: &Path) -> Result<(), Failure> {
     files::without_links(path).map_err(|error| Failure::file("write", path, error))
 }
 
-/// Where the result of a command goes: to the path that the user named, or else to one of our own naming, if no link leads there.
+/// The path for the result of a command: the user's path, or else our own if no link leads there.
 pub fn place(named: Option<&PathBuf>, own: PathBuf) -> Result<PathBuf, Failure> {
     match named {
         Some(path) => Ok(path.clone()),

@@ -1,4 +1,4 @@
-//! What commands say of a driving system of one's own that failed, or that need not repeat itself.
+//! The messages about an external driving system that failed, or that need not be deterministic.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -23,7 +23,8 @@ const FOLDER: &str = "imported";
 /// Files of a folder of catalogues that are read at most.
 const CATALOGUES_MAX: usize = 100;
 
-/// Writes every file's space, with its maps beside it. What the language cannot say is listed, and nothing is written.
+/// Writes every file's space, with its maps beside it. If the language cannot express a part, the part is listed and nothing
+/// is written.
 pub fn import(output: &Output, arguments: &ImportArguments) -> Result<(), Failure> {
     let targets = targets(arguments)?;
     let parameters = parameters(arguments)?;
@@ -79,7 +80,7 @@ pub fn import(output: &Output, arguments: &ImportArguments) -> Result<(), Failur
     }
 }
 
-/// What was written of a file.
+/// The files written for an imported file.
 struct Taken {
     /// `None` of a file that avastra exported: its scenario stands alone.
     space: Option<PathBuf>,

@@ -1,5 +1,5 @@
-//! Ctrl-C and SIGTERM: the first ends a command after the episodes under way, if it can be gone on with; otherwise, and the
-//! second time, all ends at once, external driving systems included.
+//! Ctrl-C and SIGTERM. The first signal ends a resumable command after the episodes under way. For other commands, and the
+//! second time, everything ends at once, external driving systems included.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};

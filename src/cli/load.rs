@@ -1,5 +1,5 @@
-//! Loads files for the commands: each is read, checked and its diagnostics printed; a command gets a table, a
-//! scenario, a policy or a profile, or an error.
+//! Loads files for the commands. Each file is read and checked, and its diagnostics are printed. A command gets a table,
+//! a scenario, a policy or a profile, or an error.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -120,7 +120,7 @@ fn judged(path: &Path, loaded: Result<Loaded, ReadError>) -> Result<Loaded, Fail
     Ok(loaded)
 }
 
-/// What to name in place of a folder: the scenarios of a run, or the sources that lie in it.
+/// Tells the user what to name in place of a folder: the scenarios of a run, or the sources in the folder.
 fn name_a_file_in(folder: &Path) -> String {
     let within = ["critical", "failures", ""].map(|name| folder.join(name));
     match within.iter().find(|folder| sources_in(folder).is_ok_and(|files| !files.is_empty())) {
@@ -300,22 +300,21 @@ pub fn under_test(ads: &str, config: Option<&Path>, command: Option<&str>) -> Re
     Ok(UnderTest { ads: ads.to_owned(), profile: settings.as_ref().map(Profile::new), external: None })
 }
 
-/// What `--ads` gives: the name of a driving system of avastra, or else a profile or a command.
+/// The value of `--ads`: the name of a driving system of avastra, or else a profile or a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Driver<'a> {
     /// That name; with a profile or a command the default one.
     pub ads: &'a str,
     /// A profile of `modular`, or of an external one.
     pub profile: Option<&'a Path>,
-    /// What starts or reaches an external one.
+    /// The command or address of an external one.
     pub command: Option<&'a str>,
 }
 
-/// What a text after `--ads` gives: an address; a profile, which ends like YAML; a command, which has a blank or a path; else a
-/// name.
+/// Reads a text after `--ads`: an address, a profile (ends like YAML), a command (has a blank or a path), or else a name.
 ///
 /// # Errors
-/// If it is a lone word and no name: a program of the search path that is started by a slip would be none that was meant.
+/// If it is a lone word and no name: a typing mistake must not start a program of the search path.
 pub fn driver(text: &str) -> Result<Driver<'_>, Failure> {
     let given = Driver { ads: run::DEFAULT_ADS, profile: None, command: None };
     let is_address = text.starts_with("tcp:") || text.starts_with("unix:");
@@ -374,8 +373,8 @@ pub fn is_yaml(text: &str) -> bool {
     Path::new(text).extension().is_some_and(|extension| extension == "yaml" || extension == "yml")
 }
 
-/// An external driving system, by a command or by the `ads` block of a profile; with both, the command goes before the
-/// one of the profile.
+/// An external driving system, by a command or by the `ads` block of a profile. With both, the command takes precedence
+/// over the profile's.
 pub fn external(config: Option<&Path>, command: Option<&str>) -> Result<Option<ExternalSettings>, Failure> {
     let target = command.map(|text| {
         Target::from_text(text).map_err(|reason| Failure::usage(format!("cannot start `{text}`: {reason}")))
@@ -421,7 +420,7 @@ pub fn traffic(wanted: &str) -> Result<TrafficProfile, Failure> {
     TrafficProfile::shipped(wanted).map_err(Failure::usage)
 }
 
-/// What a file that avastra wrote holds, with the table of its space.
+/// The content of a file that avastra wrote, with the table of its space.
 pub enum Emitted {
     Scenario(ActionTable, Box<Scenario>),
     Policy(ActionTable, Box<Policy>),
@@ -468,7 +467,7 @@ fn space(loaded: Loaded, path: &Path) -> Result<Arc<Space>, Failure> {
     space.ok_or_else(|| Failure::usage(format!("`{}` declares no action", path.shown())))
 }
 
-/// What a text in YAML says; `path` is its file.
+/// Parses a text in YAML; `path` is its file.
 ///
 /// # Errors
 /// If it has another form: the reason, with its place.
@@ -494,8 +493,8 @@ pub fn read_used(path: &Path) -> Result<String, ReadError> {
     read_named(path, &["ava", "xodr"], "neither a source (`.ava`) nor a map (`.xodr`)")
 }
 
-/// Reads a file that another file names. Whatever a file from somebody else names, only files of a kind are read and shown in a
-/// diagnostic: the name must say so, and that of the file at the end of a link.
+/// Reads a file that another file names. The naming file may be untrusted, so only files of the given kinds are read and
+/// shown in a diagnostic. The extension must match, and so must the extension of the file at the end of a link.
 pub fn read_named(path: &Path, extensions: &[&str], what_else: &str) -> Result<String, ReadError> {
     let followed = path.canonicalize().map_err(|error| {
         let meant = beside(path).map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));

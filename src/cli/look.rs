@@ -1,9 +1,9 @@
 //! Scenarios to look at: `render`, `report` and `replay` show them even if their space, engine or settings have changed.
 //!
 //! A run, a training and an estimate keep a copy of their space. A scenario whose space has changed is played in that copy,
-//! as it was recorded. Without a copy it is played in the present space, and the digest of its trace tells whether that is the
-//! recorded episode. Either way a banner says what has changed, and how the scenario can be brought along. `test`, `shrink`,
-//! `diagnose` and `export` judge by the space or hand on what it says, so they refuse one that has changed, and say where its copy is.
+//! as it was recorded. Without a copy it is played in the present space, and the digest of its trace tells whether that is
+//! the recorded episode. Either way a banner says what has changed, and how to bring the scenario along. `test`, `shrink`,
+//! `diagnose` and `export` judge by the space or pass it on. They refuse a changed space, and say where its copy is.
 
 use std::path::{Path, PathBuf};
 

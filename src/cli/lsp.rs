@@ -1,8 +1,8 @@
 //! `avastra lsp`: the language in an editor, by the Language Server Protocol 3.17 over stdin and stdout.
 //!
 //! Every question of the protocol is one of `avastra_editor`; here it is read from JSON and its answer written as JSON.
-//! A thread reads messages into a queue. All that have arrived are looked at before one is answered, so that a request
-//! can be cancelled and a burst of keystrokes is checked once.
+//! A thread reads messages into a queue. The server looks at all queued messages before it answers one. So a request can
+//! be cancelled, and a burst of keystrokes is checked once.
 
 mod transport;
 mod uri;
@@ -49,7 +49,7 @@ const TOKEN_TYPES: [&str; 9] =
 /// The modifiers of a token, one bit each.
 const TOKEN_MODIFIERS: [&str; 3] = ["declaration", "readonly", "defaultLibrary"];
 
-/// What the reading thread hands over.
+/// A message from the reading thread.
 type Incoming = Result<Vec<u8>, TransportError>;
 
 /// Serves until the editor sends `exit` or closes the input.
@@ -216,7 +216,7 @@ struct Server {
     news: bool,
     /// Documents whose text changed since then.
     touched: BTreeSet<PathBuf>,
-    /// What the editor shows, by file.
+    /// The diagnostics that the editor shows, by file.
     published: BTreeMap<PathBuf, Vec<Mistake>>,
 }
 
@@ -644,8 +644,8 @@ fn symbol_kind(kind: OutlineKind) -> u32 {
     }
 }
 
-/// Five numbers for each name: lines since the last name, UTF-16 units since the last name or the start of the line,
-/// length, kind and modifiers.
+/// Five numbers for each name: lines since the last name, column, length, kind and modifiers. The column counts UTF-16
+/// units since the last name or the start of the line.
 fn token_data(tokens: &[Token]) -> Vec<usize> {
     let mut data = Vec::new();
     let mut last = Point::default();
@@ -663,7 +663,7 @@ fn token_data(tokens: &[Token]) -> Vec<usize> {
     data
 }
 
-/// What the server can do, for the editor.
+/// The capabilities of the server, for the editor.
 fn capabilities() -> Value {
     json!({
         "capabilities": {

@@ -2,12 +2,12 @@
 //!
 //! The units of all shards are taken over into one database, whichever shard has them, with the scenarios that were written
 //! of them. Their texts are in the database, so their files may be edited or gone. The result is a directory in which all is
-//! played. It is ended by the command itself, which settles the database and writes the results: there is no
-//! second writer, and the bytes are those of the unsharded directory.
+//! played. The command itself ends it: it settles the database and writes the results. There is no second writer, and
+//! the bytes are the same as in the unsharded directory.
 //!
-//! Shards may have been copied from where they were played. What their settings name outside them, the space above all, is
-//! looked for where they say, and else by the end of its path from the folder that one works in and those above: whatever
-//! means the same serves.
+//! Shards may have been copied from where they were played. Their settings name files outside of them, the space above all.
+//! Each file is looked for at its path, and else by the end of its path, from the working directory and the folders above.
+//! Any file that means the same serves.
 //!
 //! Until it is whole, the directory has the name `OUT.partial`. It gets its own name only if its space still means what it
 //! meant; then it is ended. A merge that was killed in between is ended by the next one. Two merges into one directory are kept
@@ -35,7 +35,7 @@ use super::files::{folder, make, remove, write};
 use super::output::{Output, plural};
 use super::{cell_times, load, pack, run_directory, shard};
 
-/// Tells a directory of a merge from one of somebody else's. The merge has it locked.
+/// Marks a directory as a merge's, and not a user's. The merge has it locked.
 const MARK: &str = "merge.partial";
 
 /// Brings shards together, or says which are missing.
@@ -62,7 +62,7 @@ pub fn merge(output: &Output, arguments: &MergeArguments) -> Result<(), Failure>
     }
 }
 
-/// What the settings of all shards name outside of them.
+/// The files outside of the shards that their settings name.
 struct Outside {
     space: PathBuf,
     policy: Option<PathBuf>,
@@ -168,7 +168,7 @@ pub fn merged<C: Cut>(output: &Output, directories: &[PathBuf], out: Option<&Pat
     Ok(())
 }
 
-/// What the directories of shards are of, and what they have.
+/// The content of the shards' directories.
 struct Survey {
     /// The text of the settings in the merged directory.
     settings: String,
@@ -281,7 +281,7 @@ fn begin_partial(out: &Path) -> Result<(PathBuf, Lock), Failure> {
     }
 }
 
-/// What is in the directory of a merge besides its mark.
+/// The entries in the directory of a merge besides its mark.
 fn besides_mark(partial: &Path) -> Result<Vec<DirEntry>, Failure> {
     let entries = std::fs::read_dir(partial).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
     let mut entries = entries.map_err(|error| Failure::file("read", partial, error))?;
@@ -346,7 +346,7 @@ fn publish<C: Cut>(
     let resumed = |output| run_directory::resume::<C>(output, partial, true).map(drop);
     resumed(&Output::silent()).or_else(|_| resumed(output))?;
     if !out.exists() || std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_none()) {
-        // In this order: a kill in between leaves a whole directory, and not a partial one that nobody would take up.
+        // In this order: a kill in between leaves a whole directory, and not a partial one that no command would end.
         files::rename(partial, out).map_err(|error| Failure::file("write", out, error))?;
         return remove(&out.join(MARK));
     }
@@ -386,7 +386,7 @@ fn holds_all<C: Cut>(out: &Path, (partial, outside): (&Path, &Outside), text: &s
 }
 
 impl Outside {
-    /// What the settings of a directory name, where they say or elsewhere, if it means what it meant.
+    /// The files that the settings of a directory name, at their paths or elsewhere, if their meaning is unchanged.
     fn of<C: Cut>(directory: &Path) -> Result<Outside, Failure> {
         let (mut settings, _) = run_directory::settings_of::<C>(directory)?;
         let named = settings.outside();
@@ -399,7 +399,7 @@ impl Outside {
         let direct = directory.join(path);
         let space = match found("space", path, directory, &is_sealed) {
             Err(_) if direct.is_file() => {
-                // What has changed in it is said before the directory is published. A policy cannot be read in it.
+                // Changes of the space are said before the directory is published. A policy cannot be read in such a space.
                 let policy = policy.map(|policy| directory.join(&policy.file));
                 return Ok(Outside { space: direct, policy });
             }
@@ -436,8 +436,8 @@ fn found(
     })
 }
 
-/// Files that a relative path may mean which leads nowhere, because its directory was moved: the path without its way up, then
-/// ever shorter ends of it, from the folder that one works in, from the directory, and from those above.
+/// Files that a relative path may mean if it leads nowhere because its directory was moved. Candidates are the path without
+/// its way up, then ever shorter ends of it. Each is tried from the working directory, the directory, and the folders above.
 fn elsewhere(path: &str, directory: &Path) -> Vec<PathBuf> {
     let parts: Vec<Component> =
         Path::new(path).components().filter(|part| matches!(part, Component::Normal(_))).collect();
@@ -454,7 +454,7 @@ fn elsewhere(path: &str, directory: &Path) -> Vec<PathBuf> {
 }
 
 impl Way<'_> {
-    /// The path of the space in one directory as it stands in another. What is inside the directory stays there.
+    /// The path of the space in one directory as it stands in another. A space inside the directory stays there.
     fn space(&self, path: &str) -> Result<String, Failure> {
         let is_inside = Path::new(path).is_relative() && !Path::new(path).starts_with("..");
         if is_inside { Ok(path.to_owned()) } else { load::relative(self.to, &self.outside.space) }
@@ -542,8 +542,8 @@ impl Way<'_> {
     }
 }
 
-/// Writes a scenario of a shard, with the recorded answers that lie beside it there, and returns its text, in which paths lead
-/// from the new file.
+/// Writes a scenario of a shard, with the recorded answers that lie beside it there. Returns its text, in which paths are
+/// relative to the new file.
 fn copy_scenario(name: &PlainName, text: &str, way: &Way) -> Result<String, Failure> {
     let text = moved_scenario(text, way)?;
     copy_text(&way.to.join(name), &text)?;

@@ -1,4 +1,4 @@
-//! What somebody is told who mistypes a command, or uses the name that it had.
+//! The error for a mistyped command, or for a command's old name.
 
 use clap::error::{ContextKind, ContextValue};
 
@@ -6,8 +6,8 @@ use avastra_lang::syntax::nearest;
 
 use super::help;
 
-/// An unknown command's error with what it is called now, or else with the command that differs least: clap's own measure
-/// prefers `render` to `run` for `rn`.
+/// An unknown command's error with its present name, or else with the command that differs least. For `rn`, clap's own
+/// measure prefers `render` to `run`.
 pub fn with_nearest_command(mut error: clap::Error) -> clap::Error {
     let is_option =
         |value: &&ContextValue| matches!(value, ContextValue::String(word) if word.starts_with("--"));

@@ -153,6 +153,6 @@ pub fn main() -> ExitCode {
     if let Err(lost) = &arrived {
         output::remark(&format!("error: {lost}"));
     }
-    // What was found and not told is not found.
+    // A result that could not be printed counts as a failure.
     arrived.and(result).map_or_else(|failure| ExitCode::from(failure.status()), |()| ExitCode::SUCCESS)
 }

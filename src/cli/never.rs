@@ -1,5 +1,5 @@
-//! What never happened in a run: rows of the table for which the agent never asked, or that were never legal, never chosen or never
-//! carried out, with what stood in their way.
+//! The rows of the table that never happened in a run. The agent never asked for them, or they were never legal, never
+//! chosen or never executed. The reasons stand beside them.
 
 use std::collections::BTreeMap;
 

@@ -1,5 +1,4 @@
-//! `avastra new`: a small space of one's own, with its road, to begin with, or on a map of one's own; or one of the shipped
-//! examples.
+//! `avastra new`: writes a small space to begin with, on its own road or on the user's map, or one of the shipped examples.
 
 use std::path::Path;
 
@@ -32,7 +31,7 @@ pub const SHIPPED: [(&str, &str); 6] = [
     ("roads/residential.xodr", include_str!("../../scenarios/roads/residential.xodr")),
 ];
 
-/// The examples, each with a map of its own if it has one.
+/// The examples, each with its map if it has one.
 macro_rules! examples {
     ($($name:literal $($map:literal)?),+ $(,)?) => {
         const EXAMPLES: &[(&str, &str, &[(&str, &str)])] = &[$((
@@ -88,7 +87,7 @@ const PROVING_GROUND: Files = &[
     ("roads/proving_ground.xodr", include_str!("../../scenarios/roads/proving_ground.xodr")),
 ];
 
-/// What `--template` takes.
+/// The values of `--template`.
 pub fn template_names() -> PossibleValuesParser {
     let examples = EXAMPLES.iter().map(|(name, ..)| *name);
     PossibleValuesParser::new(examples.chain(CATALOGUE.iter().map(|(name, ..)| *name)))

@@ -22,7 +22,7 @@ pub struct Output {
     collected: Mutex<Vec<DiagnosticRecord>>,
     /// The diagnostics that were printed for people.
     told: Mutex<BTreeSet<String>>,
-    /// What the command found, for JSON, which prints it at the end.
+    /// The command's result for JSON, printed at the end.
     result: Mutex<Fields>,
     /// Why something that was printed is lost.
     lost: Mutex<Option<String>>,
@@ -103,7 +103,7 @@ impl Output {
         }
     }
 
-    /// Whether a program reads what is printed, or nobody.
+    /// Whether the output is read by a program, or not at all.
     fn is_for_no_person(&self) -> bool {
         matches!(self.format, Format::Json | Format::Silent)
     }
@@ -131,7 +131,7 @@ impl Output {
         self.head("error", "31", &failure.to_string());
     }
 
-    /// What the user should know though the command does not fail, on stderr; JSON has it in the result.
+    /// Prints a warning to stderr, for something that does not make the command fail. JSON has it in the result.
     pub fn warn(&self, text: &str) {
         self.head("warning", "33", text);
     }
@@ -152,7 +152,7 @@ impl Output {
         }
     }
 
-    /// What explains what a command does, on stderr.
+    /// Prints an explanation of what a command does to stderr.
     pub fn aside(&self, text: &str) {
         if !self.quiet && !self.is_for_no_person() {
             remark(text);
@@ -202,7 +202,7 @@ impl Output {
         }
     }
 
-    /// What the command found, an object; told in JSON alone, at the end.
+    /// Sets the command's result, an object. It is printed in JSON alone, at the end.
     pub fn result(&self, result: impl serde::Serialize) {
         if self.is_json() {
             let value = serde_json::to_value(result).expect("results have string keys only");
@@ -286,11 +286,11 @@ fn is_on_screen() -> bool {
     std::io::stderr().is_terminal() && std::env::var_os("TERM").is_none_or(|name| name != "dumb")
 }
 
-/// What every terminal shows in a line; longer text is folded.
+/// Columns that every terminal shows in a line; longer text is folded.
 pub const COLUMNS: usize = 80;
 
-/// A text in lines of at most `width` letters, cut between words; at least one line. A longer word has a line of
-/// its own.
+/// A text in lines of at most `width` letters, cut between words; at least one line. A longer word stands alone in its
+/// line.
 pub fn folded(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in text.split_whitespace() {

@@ -135,7 +135,7 @@ impl Plan {
             make_way(folder, path).and_then(|()| write(path, text)).map(|()| written.push(path))
         });
         done.and_then(|()| check()).inspect_err(|_| {
-            // What cannot be removed either is left: the failure is told.
+            // A file that cannot be removed either is left: the failure is told.
             written.iter().for_each(|file| drop(files::remove(file)));
             folders.sort_by_key(|folder| core::cmp::Reverse(folder.components().count()));
             folders.iter().for_each(|folder| drop(files::remove_empty(folder)));

@@ -16,7 +16,7 @@ use super::output::{Output, plural};
 use super::progress::{Pieces, Working};
 
 /// Worker threads: as many as asked for, or one for each core. A driving system behind a socket may serve one connection
-/// at a time, so it gets one, and otherwise must show that it serves as many.
+/// at a time, so its default is one thread. Every driving system must show that it serves as many as there are threads.
 pub fn jobs(asked: Option<u32>, program: Option<&Arc<Program>>) -> Result<usize, Failure> {
     let cores = || match program {
         Some(program) if program.settings().command.is_socket() => 1,
@@ -29,7 +29,7 @@ pub fn jobs(asked: Option<u32>, program: Option<&Arc<Program>>) -> Result<usize,
     Ok(jobs)
 }
 
-/// What came of each file, in the order of the files.
+/// The result for each file, in the order of the files.
 pub struct PerFile<T> {
     pub done: Vec<T>,
     failed: Vec<(PathBuf, Failure)>,
@@ -77,8 +77,8 @@ fn hand_on<T>(
     next
 }
 
-/// Does `work` for every file on as many threads as [`jobs`] says, for `program` if one is to drive. Of several files, it
-/// says which failed; after Ctrl-C those under way are ended, and it says which are not done.
+/// Does `work` for every file on as many threads as [`jobs`] says, for `program` if one is to drive. With several files, it
+/// says which failed. After Ctrl-C, files under way are ended, and it says which are not done.
 pub fn each_file<T: Send>(
     output: &Output,
     many: &FilesArguments,

@@ -19,7 +19,7 @@ use super::output::{Output, Telling, plural, remark};
 pub struct Progress {
     count: Count,
     found: usize,
-    /// What became of the collisions that are told: `counted`, for example.
+    /// The words behind the number of collisions: `counted`, for example.
     how: &'static str,
 }
 

@@ -129,8 +129,8 @@ fn csv(tests: &[ProtocolTest]) -> String {
     text
 }
 
-/// The tests as JUnit XML: a contact or a breach is a failure, a driving system that failed an error; an action that did not happen is skipped, and so is a test whose
-/// road users crashed into each other before it could show anything.
+/// The tests as JUnit XML. A contact or a breach is a failure, and a driving system that failed is an error. An action that
+/// did not happen is skipped. A test whose road users crashed into each other before it could show anything is skipped, too.
 fn junit(suite: &str, tests: &[ProtocolTest]) -> String {
     let is_error = |test: &&ProtocolTest| test.ending == Some(Ending::Failed) && test.breached.is_empty();
     let errors = tests.iter().filter(is_error).count();

@@ -105,8 +105,8 @@ fn times(arguments: &RenderArguments, scenario: &Scenario, step_s: f64) -> Resul
     Ok(STRIP_S.iter().map(|before_s| (first_s - before_s).max(0.0)).collect())
 }
 
-/// The world at the first tick at or after each time, as far as the episode lasts; what the picture is about; and whether
-/// the episode is the recorded one, if the file says.
+/// The world at the first tick at or after each time, as far as the episode lasts. Also the subject of the picture, and
+/// whether the episode is the recorded one, if the file says.
 fn moments(
     table: &ActionTable,
     scenario: &Scenario,
@@ -145,8 +145,8 @@ fn moments(
     Ok((moments, Subject { title, hit, names }, stage.is_as_recorded(&log)))
 }
 
-/// The title of a drive that is not the recorded one: whose it is, and what happens, because what the file says of its crash
-/// may not.
+/// The title of a drive that is not the recorded one. It names the driving system and what happens, because the crash in the
+/// file may not happen.
 fn title_of_another(arguments: &RenderArguments, scenario: &Scenario, subject: &Subject) -> String {
     let driver = arguments.against.ads.as_deref().unwrap_or("another driving system");
     match subject.hit {

@@ -20,7 +20,7 @@ use super::output::{Output, for_shell, plural};
 use super::parallel::each_file;
 use super::policy::claims;
 
-/// What was found about a file.
+/// The result for a file.
 enum Replayed {
     Scenario(Box<Played>),
     /// With the claims that do not hold.
@@ -138,7 +138,7 @@ pub fn refutation(refuted: usize) -> Result<(), Failure> {
     if refuted > 0 { Err(Failure::Refuted { claims: refuted }) } else { Ok(()) }
 }
 
-/// What a replay of one file found.
+/// The result of replaying one scenario.
 struct Played {
     path: PathBuf,
     /// The name of the scenario.
@@ -147,7 +147,7 @@ struct Played {
     claims: Option<Vec<oracle::ClaimResult>>,
     /// The banner about changes since the file was written, if there are any.
     banner: Option<String>,
-    /// What happened, in words.
+    /// The outcome, in words.
     told: String,
     /// Another driving system than the recorded one failed.
     has_ads_failed: bool,
@@ -185,7 +185,7 @@ fn play(
             return claims;
         }
         for claim in claims.iter_mut().filter(|claim| claim.is_refuted()) {
-            // What may answer otherwise cannot refute a claim by doing so.
+            // A driving system that is not deterministic cannot refute a claim by answering otherwise.
             let name = program.attached().name();
             claim.confirmed = None;
             claim.found = format!("{} this time, but {name} is not deterministic", claim.found);
@@ -249,7 +249,7 @@ fn play(
     Ok(Played { path, name, claims, banner, told, has_ads_failed, result })
 }
 
-/// What another driving system breaches, and what of the claimed breaches it does not.
+/// The requirements that another driving system breaches, and the claimed breaches that it avoids.
 fn breaches_text(space: &Space, scenario: &Scenario, log: &EpisodeLog) -> String {
     let name = |breach: &Breach| space.requirements[breach.requirement].name.as_str();
     let breached =

@@ -128,7 +128,7 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
     refutation(refuted)
 }
 
-/// What a path holds.
+/// The content of a path.
 #[derive(Default)]
 struct Found {
     title: String,
@@ -242,7 +242,7 @@ fn of_run(
         Some(true) if !is_changed => missing_of_training(directory, settings, &database)?,
         Some(false) => match serde_yaml::from_str::<RunSettings>(settings) {
             Ok(run) => missing(directory, &run, &database, |_| true)?,
-            // Of settings of another version it is not known what they ask for.
+            // The work that settings of another version ask for is not known.
             Err(_) => None,
         },
         _ => None,
@@ -331,7 +331,7 @@ fn missing_of_training(
     })
 }
 
-/// The files to play, and how many are left out: the worst comes first, then one of each kind of failure, then the others,
+/// The files to play, and how many are left out. The worst comes first, then one of each kind of failure, then the others,
 /// worst first.
 fn chosen(found: &Found, most: usize) -> (Vec<PathBuf>, usize) {
     let rank_of: BTreeMap<&str, usize> =

@@ -1,7 +1,7 @@
-//! What a scenario says of its world against what is there now: the space, the engine and the driving system may have
-//! changed since it was written. It is played again as they are now, each difference is said in words, and the text is
-//! made that says the new. Of the file only what differs is replaced: digests, what it was played by, and claims that do not
-//! hold any more. Claims that an author took out stay out.
+//! Compares a scenario's claims about its world with the present. The space, the engine and the driving system may have
+//! changed since it was written. It is played again as they are now, each difference is said in words, and an updated text
+//! is made. Only differing parts of the file are replaced: digests, the driving system, and claims that do not hold any
+//! more. Claims that an author took out stay out.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -51,18 +51,18 @@ impl Change {
     }
 }
 
-/// What came of playing a scenario as things are now.
+/// The result of playing a scenario with the present space, engine and driving system.
 pub struct Review {
     pub change: Change,
     /// Each difference in words.
     pub differences: Vec<String>,
     /// Which step is not legal any more, and why.
     pub illegal: Option<String>,
-    /// What is so now; `None` for what is gone.
+    /// The present state; `None` if the finding is gone.
     pub now: Option<Now>,
 }
 
-/// What a scenario's files say if it is taken over as it is now.
+/// The content of a scenario's files if the present state is accepted.
 pub struct Now {
     pub text: String,
     /// The text of its file of answers; `None` if there is none, or if the one that is there holds as it is.
@@ -264,8 +264,8 @@ fn newly_hit(scenario: &Scenario, summary: &EpisodeSummary) -> Vec<String> {
     new.map(|contact| format!("npc#{} is hit at {:.2} s", contact.obstacle, contact.time_s)).collect()
 }
 
-/// A scenario's file with what another text of it says in these `fields` of its origin, and with the other text's claims in place
-/// of those that are refuted. Everything else stays: other claims, comments, ends of lines.
+/// A scenario's file with these `fields` of its origin taken from another text of it. The other text's claims replace the
+/// refuted ones. Everything else stays: other claims, comments, ends of lines.
 fn rewritten(text: &str, anew: &str, is_refuted: &[bool], fields: &[&str]) -> String {
     let (old_file, new_file) = (parsed(text), parsed(anew));
     let (Some((old, old_docs)), Some((new, new_docs))) = (scenario_of(&old_file), scenario_of(&new_file))
@@ -277,7 +277,7 @@ fn rewritten(text: &str, anew: &str, is_refuted: &[bool], fields: &[&str]) -> St
         edits.extend(field_edit(name, (text, old), (anew, new)));
     }
     edits.extend(claim_edits((text, &old.expects), (anew, &new.expects), is_refuted));
-    // The sentence above it tells of the crash, unless somebody wrote another one.
+    // The sentence above it tells of the crash, unless the author wrote another one.
     if let ([old], [new]) = (old_docs, new_docs)
         && is_refuted.contains(&true)
         && old.text.contains(" is hit at ")
@@ -297,11 +297,11 @@ fn rewritten(text: &str, anew: &str, is_refuted: &[bool], fields: &[&str]) -> St
     result + &text[at..]
 }
 
-/// What a claim is about: its kind, and the number of the obstacle or the requirement.
+/// The subject of a claim: its kind, and the number of the obstacle or the requirement.
 type About<'a> = (&'a str, Option<&'a str>);
 
-/// How claims that do not hold become what is so now: the new text's claim of the same kind about the same obstacle, else one
-/// about an obstacle of which the file claims nothing of that kind. What has none goes.
+/// Replaces claims that do not hold. The new claim is of the same kind and about the same obstacle, or else about an
+/// obstacle for which the file has no claim of that kind. A claim without such a replacement goes.
 fn claim_edits(
     (text, old): (&str, &[Expect]),
     (anew, new): (&str, &[Expect]),

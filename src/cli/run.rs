@@ -35,10 +35,10 @@ use super::policy::acting;
 use super::run_directory::{Player, Resumed};
 use super::{compile, conditions, load, merge, protocol, run_directory, shard};
 
-/// Episodes on each road if nobody asks for more or less.
+/// Episodes on each road, if a command line gives no number.
 const EPISODES: u32 = 100;
 
-/// Episodes that a program which says it is deterministic is asked a second time: one alone may come out alike by chance.
+/// Episodes that are played twice with a program that says it is deterministic. One alone may come out the same by chance.
 const SPOT_CHECKS: usize = 3;
 
 /// Largest number of critical scenarios, groups and refusal reasons that the summary lists.
@@ -229,7 +229,7 @@ fn play_all(
     Ok(totals)
 }
 
-/// A new run in a directory of its own; for a dry run only says what would be played.
+/// A new run in a new directory. A dry run only says what would be played.
 fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<Begun>, Failure> {
     let (out, face) = (arguments.out.as_deref(), arguments.face);
     // With its own table.
@@ -526,7 +526,7 @@ fn refusals_text(refusals: &[RefusalCount]) -> String {
     cut_short(head, refusals, line, |more| format!("and for {more} other reasons"))
 }
 
-/// Distinct failures by pre-crash type, each with how often it was found, a scenario that shows it, how often its collision
+/// Distinct failures by pre-crash type. Each has how often it was found, a scenario that shows it, how often its collision
 /// recurs, and what happened there.
 pub fn groups_text(groups: &[Group]) -> String {
     let line = |group: &Group| {
@@ -614,7 +614,7 @@ fn worst_first(mut files: Vec<PathBuf>, found: &[FoundIn]) -> Vec<PathBuf> {
     files
 }
 
-/// Lists scenarios in the order of their files. What was found in them says how sure and how bad it is.
+/// Lists scenarios in the order of their files. The finding in each says how sure and how bad it is.
 pub fn critical_text(directory: &Path, files: &[PathBuf], found: &[FoundIn]) -> String {
     if files.is_empty() {
         return "no critical scenario".to_owned();

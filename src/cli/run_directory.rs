@@ -3,8 +3,8 @@
 //! A directory is begun when its settings stand in it. What a kill leaves before that counts as empty, so the
 //! directory can be begun again; what it leaves after that can be resumed. One process at a time works in it.
 //!
-//! The truth of a directory is its database, which has the text of each scenario, too: a missing scenario is written again,
-//! and an edited one is named. So is the copy of the space, whose meaning the settings record.
+//! The database is the source of truth, and has the text of each scenario, too. A missing scenario is written again, and an
+//! edited one is named. The same holds for the copy of the space, whose meaning the settings record.
 
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
@@ -89,9 +89,9 @@ pub fn hold(path: &Path) -> Result<Held, Failure> {
     Ok(Held { path: path.to_owned(), _lock: lock })
 }
 
-/// An external driving system as settings in `directory` record it: its working directory is one from there, so that the
-/// same program is started wherever the run is resumed from. If it is missing on this machine, the path follows from the names
-/// alone.
+/// An external driving system as settings in `directory` record it. Its working directory is relative to `directory`, so
+/// the same program starts wherever the run is resumed from. If the folder is missing on this machine, the path follows
+/// from the names alone.
 ///
 /// # Errors
 /// If this process has no folder that it works in.
@@ -118,7 +118,7 @@ pub struct Begun {
     space_digest: Option<String>,
 }
 
-/// What settings begin with, of any kind and version, and whether they are of an earlier build, which had no `conditions`.
+/// The beginning of settings of any kind and version, and whether an earlier build wrote them, without `conditions`.
 pub fn begun_in(text: &str) -> Option<(Begun, bool)> {
     let (fields, has_conditions) = run::flat(text)?;
     Some((serde_json::from_value(fields.into()).ok()?, !has_conditions))
@@ -193,7 +193,7 @@ pub fn resume<C: Campaign>(
     if C::Database::keeps_scenarios() {
         folder(directory, "critical")?;
     }
-    // What cannot be gone on with does not begin anew either.
+    // A directory that cannot be resumed does not begin anew either.
     if let Some(how) = lost {
         output.tell(&format!("`{}` is {how}: the {what} begins anew", database.shown()));
     }
@@ -233,11 +233,11 @@ enum Copied {
     Gone,
 }
 
-/// What became of the copy of a space in a directory. `space` is the path of the space from there, `digest` what it meant.
+/// The state of a space's copy in a directory. `space` is the path of the space from there, `digest` its recorded meaning.
 fn copied(directory: &Path, space: &str, digest: &str) -> Copied {
     let folder = directory.join(pack::SPACE);
     let space = Path::new(space);
-    // What is played is the copy itself, which is compared whenever it is read.
+    // The run plays the copy itself, which is compared whenever it is read.
     let is_inside = space.is_relative() && !space.starts_with("..");
     if is_inside {
         return Copied::Sound;
@@ -303,7 +303,7 @@ fn tidy(directory: &Path) -> Result<(), Failure> {
         let folder = directory.join(name);
         files::own_folder(&folder).map_err(|error| Failure::file("use", &folder, error))?;
         if folder.is_dir() {
-            // The copy of a space has folders of its own.
+            // The copy of a space has subfolders.
             files::sweep_all(&folder).map_err(|error| Failure::file("tidy", &folder, error))?;
         }
     }
@@ -320,7 +320,7 @@ pub fn settings_of<C: Campaign>(directory: &Path) -> Result<(C, String), Failure
     }
 }
 
-/// What the settings of a directory say, whichever version wrote them.
+/// The settings of a directory, whichever version wrote them.
 ///
 /// # Errors
 /// If they have another form: that another avastra wrote them, or else the reason with its place.
@@ -343,7 +343,7 @@ fn begun_elsewhere<C: Campaign>(directory: &Path, text: &str) -> Option<Failure>
     })
 }
 
-/// What a directory holds, if anything.
+/// The kind of campaign that a directory holds, if any.
 pub fn what_was_begun(directory: &Path) -> Option<Kind> {
     KINDS.into_iter().find(|kind| (kind.is_in)(directory))
 }
@@ -620,7 +620,7 @@ impl<C: Campaign> Directory<C> {
 /// An episode and what was found in it.
 pub type Judged<'a> = (&'a EpisodeLog, &'a EpisodeSummary);
 
-/// What plays the episodes of which scenarios are written.
+/// The player of the episodes that are written as scenarios.
 pub struct Player<'a> {
     pub command: &'a str,
     pub table: &'a ActionTable,

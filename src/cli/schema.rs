@@ -1,7 +1,7 @@
-//! What `--format json` prints: the fields of every command's result, for `avastra explain json`.
+//! The output of `--format json`: the fields of every command's result, for `avastra explain json`.
 //!
-//! A table and no derived schema, because most of it is what a field means: a result is made by `json!` where it arises, and
-//! has no type that could be asked. `tests/it/json.rs` compares the table with what the commands print, both ways.
+//! It is a table and no derived schema, because most of it is the meaning of fields. A result is made by `json!` where it
+//! arises, and has no type to derive from. `tests/it/json.rs` compares the table with the commands' output, both ways.
 
 use super::output::folded;
 

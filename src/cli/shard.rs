@@ -59,7 +59,7 @@ pub fn kept(directory: &Path) -> Result<Shard, Failure> {
     load::parsed(&file, &load::text(&file)?)
 }
 
-/// What comes after a shard is played.
+/// The next step after a shard is played.
 pub fn next_step(shard: Shard) -> String {
     format!(
         "\nthis is shard {shard}: when all are played, `avastra merge DIRS --out DIR` brings them together"

@@ -21,10 +21,10 @@ use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::replay::refutation;
 
-/// The folder of what is written, beside the scenarios. What a run found stays apart from what was made of it.
+/// The folder of the shrunk scenarios, beside the scenarios. A run's findings stay apart from files made of them.
 pub const FOLDER: &str = "shrunk";
 
-/// What the name of a shrunk scenario ends with.
+/// The end of a shrunk scenario's name.
 const SUFFIX: &str = "_shrunk";
 
 /// A finding that comes sooner or later by more than this is told to come at another time, s.
@@ -93,7 +93,7 @@ struct Small {
     after: (usize, usize),
     /// The actions that are left.
     actions_left: Vec<String>,
-    /// What was kept and what was traded, before and after.
+    /// The qualities that shrinking keeps or trades, before and after.
     worth: [Worth; 2],
     /// Other findings of the file that are gone.
     gone: Vec<String>,
@@ -119,7 +119,7 @@ impl Small {
         )
     }
 
-    /// What is the same as before, and what is not quite.
+    /// The qualities that are the same as before, and the ones that changed.
     fn worth_in_words(&self) -> String {
         let [before, after] = &self.worth;
         let first = |priority: &str| match priority {
@@ -170,8 +170,8 @@ impl Small {
     }
 }
 
-/// The path of the shrunk scenario of a file, in the folder `shrunk`, which is made: beside the file, or beside the folder
-/// `critical` of a run.
+/// The path of the shrunk scenario of a file, in the folder `shrunk`. The folder is made beside the file, or beside the
+/// folder `critical` of a run.
 fn apart(file: &Path) -> Result<PathBuf, Failure> {
     let beside = file.parent().unwrap_or(Path::new(""));
     let beside = if beside.ends_with("critical") { beside.parent().unwrap_or(beside) } else { beside };
@@ -297,7 +297,7 @@ fn other_findings(space: &Space, log: &EpisodeLog, judgements: &[Judgement], fou
     collisions.chain(breaches).collect()
 }
 
-/// What is there before and not after, each as often.
+/// The findings that are there before and not after. A repeated finding counts each time.
 fn gone([before, mut after]: [Vec<String>; 2]) -> Vec<String> {
     let is_gone = |finding: &String| match after.iter().position(|other| other == finding) {
         Some(at) => {
@@ -330,7 +330,7 @@ fn counted(count: f64, noun: &str) -> String {
 }
 
 /// Number of claims of a written file that do not hold. An external driving system plays the file by its recorded answers,
-/// as for everybody who replays it; what they do not cover is tried with the one that was given, `given`.
+/// as in any replay. The driving system `given` tries the claims that the answers do not cover.
 fn refuted(output: &Output, path: &Path, given: &Selected) -> Result<usize, Failure> {
     let (table, scenario) = load::scenario(output, path)?;
     let recorded = run::recorded(&scenario)?;

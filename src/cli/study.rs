@@ -93,7 +93,7 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
             let study = Study::new(table, settings.started_unless(arguments.shard.dry_run))
                 .map_err(|error| Failure::file("use", file, error))?;
             if arguments.shard.dry_run {
-                // What a driving system that was not started has played cannot be compared, but it can be read.
+                // Cells of a driving system that was not started cannot be compared, but they can be read.
                 arguments.reuse.iter().try_for_each(|directory| read(directory).map(drop))?;
                 let costs = costs(&study.settings().work());
                 let episodes = plural(costs.iter().sum::<u64>() as usize, "episode");
@@ -141,7 +141,7 @@ fn play_all(
     let left = share.lacking(study.settings(), &directory)?;
     let todo: Vec<Job> = left.iter().map(|&job| all[job].clone()).collect();
 
-    // Each job has a process, or a connection, of its own: these are only to see that they can be had.
+    // Each job has its own process or connection. The probe only checks that they are available.
     let external = study.settings().conditions.external.as_ref().filter(|_| !todo.is_empty());
     directory.refuse_to_play(external.is_none_or(|attached| !attached.is_recorded))?;
     let probe = external.map(|attached| Program::new(attached.settings.clone()));
@@ -229,7 +229,7 @@ pub fn read(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>), Failur
     }
 }
 
-/// What is sound in a study's directory.
+/// The sound part of a study's directory.
 pub struct Sound {
     pub settings: StudySettings,
     pub cells: Vec<CellRecord>,
@@ -287,7 +287,7 @@ fn failed_text(directory: &Path, cells: &[FailedCell]) -> String {
     text
 }
 
-/// What a study's file says, and asks for in full.
+/// The content of a study's file, and the full settings that it asks for.
 pub fn wanted(
     output: &Output,
     path: &Path,

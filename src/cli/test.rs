@@ -262,7 +262,7 @@ struct Suite<'a> {
 /// Diagnostics, and the texts that they point into.
 type Told = (Sources, Vec<Diagnostic>);
 
-/// What is to be printed about a file besides its result. Files are played on threads, and printed in their order.
+/// The output about a file besides its result. Files are played on threads, and printed in their order.
 #[derive(Default)]
 struct Notes {
     told: Vec<Told>,
@@ -365,8 +365,8 @@ impl Suite<'_> {
         Err(Failure::Outdated)
     }
 
-    /// Plays a scenario as things are now, says what differs in meaning, and takes it over if asked. What is gone or cannot
-    /// be played stays as it is.
+    /// Plays a scenario as things are now, says what differs in meaning, and takes it over if asked. A scenario stays as
+    /// it is if its finding is gone or if it cannot be played.
     fn review(
         &self,
         file: &Path,
@@ -397,7 +397,7 @@ impl Suite<'_> {
             let gone = Outcome::Gone(format!("{why}; it is kept as it was"));
             return Ok((emitted, (change == Change::Gone).then_some(gone)));
         };
-        // What would be claimed of the other crash is not what the file claims until it is taken over.
+        // The file does not claim the other crash until it is accepted.
         if change == Change::OtherObstacle && !self.arguments.accept {
             let other = self.asked.is_nothing().then(|| self.outcome(Regression::OtherCrash));
             return Ok((emitted, other));
@@ -477,7 +477,7 @@ impl Suite<'_> {
             Some(_) => {
                 let setup = stage.setup(&recorded);
                 let all = own.iter().map(|index| oracle::regression(&setup, &log, *index, &ads));
-                // Of several that are as bad, the first.
+                // If several are equally bad, the first.
                 let worse = |worst: Regression, next: Regression| {
                     if next.rank() > worst.rank() { next } else { worst }
                 };
@@ -529,7 +529,7 @@ fn claimed_failure(scenario: &Scenario) -> Option<FailureKind> {
     FailureKind::ALL.into_iter().find(|kind| kind.name() == end)
 }
 
-/// What is said where nothing failed, but where it cannot be said that anything was mended.
+/// The word for a test in which nothing failed, but which cannot show that anything was fixed.
 const PASSED: &str = "passed";
 
 impl Case {

@@ -175,8 +175,8 @@ fn keep(
     };
     let has_first = trained.log.first_breaches().map(is_first).collect::<Result<Vec<bool>, Failure>>()?;
     let is_critical = trained.summary.counted() > 0 || has_first.contains(&true);
-    // A training with an observation period of its own writes no scenario, because a replay would use the period
-    // of the space.
+    // A training that sets its observation period writes no scenario, because a replay would use the period of the
+    // space.
     let has_scenario = is_critical && settings.hyperparameters.observation_period_s().is_none();
     let scenario = has_scenario
         .then(|| directory.write_critical(&player, (&training.log_of_space(&trained.log), &trained.summary)));
@@ -291,13 +291,13 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
 }
 
 /// Says of examples of each distinct failure, and of each requirement, how often they recur, in their scenarios and in the
-/// database. A training finds the same failure over and over, so not all are played again, but one after the other until one
-/// recurs: only a failure of which all were tried may be called one that does not.
+/// database. A training finds the same failure over and over, so its examples are played again only until one recurs. A
+/// failure is said not to recur only if all of its examples were tried.
 fn find_recurrence(output: &Output, training: &Training, directory: &mut Directory) -> Result<(), Failure> {
     let TrainSettings { agent, conditions, .. } = training.settings();
     let player = Player { command: "train", table: training.table(), agent, conditions };
     let _working = Working::new(output, "playing what it found again");
-    // What is written anew meanwhile is done, and not looked at again.
+    // A scenario that is written anew meanwhile is done, and not looked at again.
     let written = directory.read(Units::scenarios)?;
     let mut done = BTreeSet::new();
     while oracle::can_replay(training.arena().ads()) {
@@ -308,7 +308,7 @@ fn find_recurrence(output: &Output, training: &Training, directory: &mut Directo
         let examples = written.iter().filter(|one| next.contains(&one.unit)).cloned();
         let files = run_directory::written(&directory.path, examples.collect());
         done.extend(next);
-        // What is edited or gone is the user's.
+        // A scenario that is edited or gone belongs to the user.
         for (path, _) in files.iter().filter(|file| !run_directory::is_edited(file) && file.0.is_file()) {
             let (table, scenario) = load::scenario(&Output::silent(), path)?;
             let (stage, ads) = (Stage::new(&table, &scenario)?, training.arena().ads());

@@ -1,7 +1,8 @@
 //! Keeps its lane and its speed, and sees nothing: the most trivial driving system.
 //!
-//! It follows the route with its lane changes at the speed that it is allowed and wants, slows down for bends, and minds neither
-//! road users nor lights nor signs. What it does not hit puts nobody to the test: a protocol whose rows it passes asks for nothing.
+//! It follows the route with its lane changes at the speed that it is allowed and wants, slows down for bends, and minds
+//! neither road users nor lights nor signs. It shows whether a protocol asks for anything: if this driver passes the
+//! protocol's rows, they demand nothing.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! What every driving system can do.
+//! The interface of every driving system.
 
 use avastra_world::sim::{Control, Sensed};
 
@@ -10,7 +10,7 @@ pub trait Ads: CloneAds + Send {
     /// Its command for the next tick. Called once a tick (50 Hz).
     fn drive(&mut self, sensed: &Sensed) -> Control;
 
-    /// What it believes, wants and commands at the moment.
+    /// The driving system's present beliefs, plans and commands.
     fn status(&self) -> &Status;
 
     /// Deceleration that a careful driver's model alone gave in the last tick, m/s²; 0 before it reacts, and for others.
@@ -29,7 +29,7 @@ pub trait Ads: CloneAds + Send {
         None
     }
 
-    /// What it was asked in this episode and answered, if it is an external one.
+    /// The questions and answers of this episode, if the driving system is an external one.
     fn conversation(&self) -> Option<Conversation> {
         None
     }

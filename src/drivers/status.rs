@@ -7,7 +7,7 @@ use avastra_base::geometry::{Pose, Vec2};
 use avastra_lang::model::vocabulary::Body;
 use avastra_world::sim::{Control, SensedObject};
 
-/// What a driving system believes, wants and commands.
+/// The beliefs, plans and commands of a driving system.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Status {
     /// Where it believes its rear axle is.
@@ -20,7 +20,7 @@ pub struct Status {
     pub control: Control,
     /// Apollo's `steering_rate`: its command is constant, so this is the measured rate, rad/s.
     pub steer_rate_radps: f64,
-    /// What it does with the path.
+    /// The manoeuvre along the path.
     pub manoeuvre: Manoeuvre,
     /// Why it drives as it does now: the constraint that holds it back most.
     pub reason: Reason,
@@ -31,7 +31,7 @@ pub struct Status {
 /// Ids from here on belong to ghosts: objects that a driving system sees and that are not there.
 pub const GHOST_ID_MIN: u32 = 1 << 31;
 
-/// What a plan does with the path. `Display` gives a few words, for example `nudge 3`.
+/// The manoeuvre of a plan. `Display` gives a few words, for example `nudge 3`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Manoeuvre {
     #[default]
@@ -187,7 +187,7 @@ impl Status {
 }
 
 impl Reason {
-    /// The reason in the words of an external driving system, if it has any of its own.
+    /// The reason in an external driving system's own words, if it gives any.
     pub fn in_words(self, reported: Option<&str>) -> String {
         reported.map_or_else(|| self.to_string(), str::to_owned)
     }

@@ -153,7 +153,7 @@ pub fn object(id: u32, body: Body, pose: Pose, speed_mps: f64) -> SensedObject {
     }
 }
 
-/// What is sensed on a clear day at a pose and a speed, where there are no lights.
+/// The sensor input on a clear day at a pose and a speed, where there are no lights.
 pub fn sensed(rear_axle: Pose, speed_mps: f64, objects: Vec<SensedObject>) -> Sensed {
     let ego = EgoMotion::straight(rear_axle, speed_mps);
     Sensed { time_s: 0.0, ego, objects, signals: vec![], conditions: CLEAR_DAY }

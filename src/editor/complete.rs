@@ -15,7 +15,7 @@ use super::words::Entry;
 use super::workspace::{Analysis, Workspace};
 use super::{context, hover, words};
 
-/// What a proposal is to a reader.
+/// The kind of a proposal, as shown to the author.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ProposalKind {
     Function,
@@ -50,7 +50,7 @@ pub struct Proposal {
     pub text: String,
 }
 
-/// What may be written next.
+/// The texts that may be written next.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Proposals {
     /// The part of the text that a proposal replaces.

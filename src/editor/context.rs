@@ -1,5 +1,5 @@
-//! What could be written at a place: the kinds of names that fit where `syntax::unfinished` puts its own name into the
-//! tree, or the keywords that the grammar expects if no name fits.
+//! The completions that fit at a place. `syntax::unfinished` puts its own name into the tree there, and these are the kinds
+//! of names that fit. If no name fits, they are the keywords that the grammar expects.
 
 use avastra_base::units::Dimension;
 use avastra_lang::check::{Declaration, References, Symbol};
@@ -81,7 +81,7 @@ fn bodies_together() -> Vec<Kind> {
     vec![Kind::Bodies, Kind::Words(words::of::<BodyClass>())]
 }
 
-/// What may come where no name may stand.
+/// The completions where no name may stand.
 fn keywords(found: &Unfinished, fresh_line: bool) -> Vec<Kind> {
     let mut kinds: Vec<Kind> = found.keywords.iter().map(|word| Kind::Keyword(word)).collect();
     // A scenario's first part is `road`. Its other parts are shown too, so that an author sees what there is.
@@ -94,7 +94,7 @@ fn keywords(found: &Unfinished, fresh_line: bool) -> Vec<Kind> {
     kinds
 }
 
-/// What the declaration after `override` and a keyword may replace.
+/// The kinds of names that the declaration after `override` and a keyword may replace.
 fn replaceable(item: &ItemKind) -> Vec<Kind> {
     match item {
         ItemKind::Enum(_) | ItemKind::Odds(_) => vec![Kind::Enums],
@@ -139,7 +139,7 @@ fn unused<W: Word>(fields: &[Field], of: &[W]) -> Vec<Kind> {
     vec![Kind::Words(of.iter().filter(is_left).map(|word| (word.name(), word.meaning())).collect())]
 }
 
-/// What the expressions of a declaration are about.
+/// The subject of the expressions in a declaration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum About {
     Value,
@@ -155,7 +155,7 @@ enum About {
 /// A declaration with [`HERE`] in it.
 struct Place<'a> {
     references: &'a References,
-    /// What is written of the text literal at the place.
+    /// The written part of the text literal at the place.
     written: &'a str,
     about: About,
     /// The parameters that an expression can name.

@@ -6,8 +6,8 @@ use avastra_lang::syntax::{self, FormatError};
 use super::diagnostics::Change;
 use super::workspace::Analysis;
 
-/// The changes that format the document: none, or one from the first character that differs to the last; `None` if it does
-/// not parse and stays as it is.
+/// The changes that format the document: none, or one from the first character that differs to the last. `None` if the
+/// document does not parse; it stays as it is.
 ///
 /// # Errors
 /// If the formatted text would mean something else, which is a mistake of ours.

@@ -1,4 +1,4 @@
-//! What each name is, for colours that follow meaning: a variant, a state, a word of the engine.
+//! The kind of each name, for semantic highlighting: a variant, a state, a word of the engine.
 //!
 //! Keywords, numbers and comments are coloured by the TextMate grammar.
 
@@ -7,7 +7,7 @@ use avastra_lang::check::{Occurrence, Symbol};
 use super::position::Range;
 use super::workspace::Analysis;
 
-/// What a name is to a reader. `cli/lsp` names the kinds in this order.
+/// The kind of a name. `cli/lsp` names the kinds in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NameKind {
     Enum,

@@ -1,5 +1,5 @@
-//! Inlay hints: an editor shows the rows of an action behind its name, and behind a drawn range the part of it that
-//! the rules leave.
+//! Inlay hints. An editor shows the rows of an action behind its name. Behind a drawn range it shows the part that the
+//! rules leave.
 //!
 //! Hints are shown only while the space is sound: row numbers from an earlier state could be wrong.
 

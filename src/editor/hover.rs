@@ -19,7 +19,7 @@ use super::{tokens, words};
 /// Lines of a declaration that are shown, at most.
 const LINES_MAX: usize = 12;
 
-/// What is known of a name or a keyword.
+/// The description of a name or a keyword.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hover {
     pub range: Range,
@@ -27,7 +27,7 @@ pub struct Hover {
     pub text: String,
 }
 
-/// What is known of the name or keyword at a byte of the document.
+/// Describes the name or keyword at a byte of the document.
 pub fn hover(analysis: &Analysis, byte: usize) -> Option<Hover> {
     if let Some(occurrence) = analysis.references().at(Analysis::ROOT, byte) {
         let mut texts: Vec<String> = Vec::new();

@@ -1,12 +1,12 @@
-//! What an editor asks about a document: pure questions, answered in plain types.
+//! Answers an editor's questions about a document, with pure functions and plain types.
 //!
-//! A [`Workspace`] holds the texts that are open and gives an [`Analysis`] of each: the tree of `syntax::parse`, which
-//! recovers from mistakes, and what the checker knows of every name (`check::References`). Most questions are a function
-//! of an analysis and a byte; those that reach into other files take the workspace. No name is resolved here. Places
-//! are lines and UTF-16 columns, as all editors count.
+//! A [`Workspace`] holds the open texts and gives an [`Analysis`] of each. An analysis has the tree of `syntax::parse`,
+//! which recovers from mistakes, and the checker's facts about every name (`check::References`). Most questions are a
+//! function of an analysis and a byte; questions that reach into other files take the workspace. No name is resolved
+//! here. Places are lines and UTF-16 columns, as all editors count.
 //!
-//! Nothing here reads a file, knows a protocol, or has a clock: the caller reads for it ([`Files`]), and `cli/lsp` puts
-//! questions and answers into the Language Server Protocol.
+//! Nothing here reads a file, knows a protocol, or has a clock. The caller reads files through [`Files`], and `cli/lsp`
+//! translates questions and answers to the Language Server Protocol.
 //!
 //! ```
 //! use std::path::{Path, PathBuf};

@@ -24,8 +24,8 @@ pub fn definition(analysis: &Analysis, byte: usize) -> Option<Vec<Place>> {
     Some(spans.into_iter().filter_map(|span| analysis.place(span)).collect())
 }
 
-/// Every place of the name at a byte of a document: those of the document first, then those of others that use the
-/// same declaration, open or below the editor's folders.
+/// Every place of the name at a byte of a document. The document's own places come first, then the places in other
+/// documents that use the same declaration. These documents are open or lie below the editor's folders.
 pub fn references(
     workspace: &mut Workspace,
     path: &Path,

@@ -5,7 +5,7 @@ use avastra_lang::syntax::ast::{ActionParam, Item, ItemKind, Name, Span};
 use super::position::Range;
 use super::workspace::Analysis;
 
-/// What a declaration is to a reader.
+/// The kind of a declaration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OutlineKind {
     /// A scenario or a policy.

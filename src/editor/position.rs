@@ -52,8 +52,8 @@ impl Lines {
         Point { line, column }
     }
 
-    /// The byte at a line and UTF-16 column. A column beyond the end of its line means that end, a line beyond
-    /// the text means the end of the text, and the second half of a character means its first.
+    /// The byte at a line and UTF-16 column. A column beyond its line means the end of the line. A line beyond the
+    /// text means the end of the text. The second half of a character means its first.
     pub fn byte(&self, text: &str, line: usize, column: usize) -> usize {
         let Some(&start) = self.starts.get(line) else { return text.len() };
         let end = self.starts.get(line + 1).copied().unwrap_or(text.len());

@@ -51,7 +51,7 @@ fn opened(marked: &str) -> (Workspace, PathBuf, usize) {
     (workspace, path, "language 1\nuse \"base.ava\"\n".len() + byte)
 }
 
-/// What a question about the place of the cursor is answered.
+/// The answer to a question about the place of the cursor.
 fn asked<T>(marked: &str, ask: impl FnOnce(&Workspace, &Analysis, usize) -> T) -> T {
     let (workspace, path, byte) = opened(marked);
     ask(&workspace, workspace.known(&path).expect("it was analysed"), byte)
@@ -198,7 +198,7 @@ fn a_mistake_has_a_remedy_and_a_text_its_form() {
     let remedies = asked(text, |_, analysis, byte| diagnostics::fixes(analysis, byte, byte));
     assert_eq!(written(&remedies[0].changes, "Level"), [("mine.ava".to_owned(), 1)]);
     assert!(remedies[0].is_preferred);
-    // What a used file declares may be replaced.
+    // A declaration of a used file may be replaced.
     let again = asked("let fa‸r = 60 m", |_, analysis, byte| diagnostics::fixes(analysis, byte, byte));
     assert!(again.iter().any(|one| written(&one.changes, "override ") == [("mine.ava".to_owned(), 1)]));
     let (mut workspace, path, _) = opened(text);

@@ -78,13 +78,13 @@ pub fn drivers() -> Vec<Entry> {
     DRIVERS.into_iter().map(|driver| (driver, "")).collect()
 }
 
-/// What a field of a block means: of a spawn, an order, a road, an episode or a start.
+/// The meaning of a field in a block: a spawn, an order, a road, an episode or a start.
 pub fn field(word: &str) -> Option<&'static str> {
     let blocks = [of::<Field>(), of::<RoadField>(), of::<EpisodeField>(), of::<StartField>()];
     blocks.iter().find_map(|fields| meaning(fields, word))
 }
 
-/// What a word of a list means.
+/// The meaning of a word in a list.
 pub fn meaning(words: &[Entry], word: &str) -> Option<&'static str> {
     words.iter().find(|(known, _)| *known == word).map(|(_, meaning)| *meaning)
 }

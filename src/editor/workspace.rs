@@ -29,7 +29,7 @@ pub trait Files {
     /// The sources near a file that may declare what it lacks: each one's path, as the file would write it, and its
     /// text.
     fn nearby(&self, path: &Path) -> Vec<(String, String)>;
-    /// What a folder holds: each name, and whether it is a folder. Empty if the folder cannot be read.
+    /// The entries of a folder: each name, and whether it is a folder. Empty if the folder cannot be read.
     fn entries(&self, folder: &Path) -> Vec<(String, bool)>;
 }
 
@@ -47,7 +47,7 @@ pub struct Analysis {
     stale: bool,
 }
 
-/// What the editor has open.
+/// The documents and folders that the editor has open.
 pub struct Workspace {
     /// The folders that the editor has open.
     pub folders: Vec<PathBuf>,
@@ -116,7 +116,7 @@ impl Workspace {
         self.folders.iter().flat_map(|folder| self.files.below(folder)).collect()
     }
 
-    /// What a folder holds: each name, and whether it is a folder.
+    /// The entries of a folder: each name, and whether it is a folder.
     pub fn entries(&self, folder: &Path) -> Vec<(String, bool)> {
         self.files.entries(folder)
     }
@@ -181,7 +181,7 @@ impl Analysis {
     /// The document itself.
     pub const ROOT: FileId = FileId(0);
 
-    /// What each name stands for.
+    /// The declaration that each name stands for.
     pub fn references(&self) -> &References {
         &self.loaded.references
     }

@@ -1,7 +1,7 @@
 //! The language: a text becomes a checked space, scenario or policy, or diagnostics that say where and what to do.
 //!
-//! The way of a text: [`syntax`] parses it and goes on after mistakes; [`check`] loads all that it uses, resolves names and
-//! checks types; out comes what [`model`] describes; [`prove`] says what holds of it for every draw. This crate reads no
+//! Four steps: [`syntax`] parses a text and goes on after mistakes. [`check`] loads all files that it uses, resolves names
+//! and checks types. [`model`] describes the result. [`prove`] says what holds of it for every draw. This crate reads no
 //! files: its caller hands texts over.
 //!
 //! ```

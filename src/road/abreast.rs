@@ -1,8 +1,8 @@
-//! What lies beside a lane, whichever road of the file it belongs to: carriageways of one street are
-//! often roads of their own, with a median between them that no road describes.
+//! The lanes beside a lane, whichever road of the file they belong to. Carriageways of one street are often
+//! separate roads, with a median between them that no road describes.
 //!
-//! Opposing lanes are found by geometry, not by links; lane changes stay within a road and keep to
-//! markings (see [`Lane::changes_left_m`]); ways through a junction are by links.
+//! Opposing lanes are found by geometry, not by links. Lane changes stay within a road and keep to markings
+//! (see [`Lane::changes_left_m`]). Ways through a junction are by links.
 //!
 //! [`Lane::changes_left_m`]: super::map::Lane::changes_left_m
 

@@ -105,8 +105,8 @@ impl RoadMap {
         is_apart(lowest_m, highest_m)
     }
 
-    /// A warning for each two roads that cross on one level and outside junctions: nobody gives way there, because only
-    /// junctions say who does. It is asked for where a map is looked at, not where it is driven.
+    /// A warning for each two roads that cross on one level and outside junctions: no vehicle gives way there, because
+    /// only junctions say which one must. It is asked for where a map is looked at, not where it is driven.
     pub fn crossings_without_junction(&self) -> Vec<String> {
         let road_of = self.road_numbers();
         let street_of = |lane: usize| self.lanes[lane].junction.is_none().then(|| road_of[lane]);

@@ -46,7 +46,7 @@ pub struct Lane {
     pub speed_limit_mps: f64,
     /// Whether the map states it; without a limit 50 km/h is taken.
     pub states_limit: bool,
-    /// Whether its road is a motorway, on which nobody goes on foot.
+    /// Whether its road is a motorway, from which pedestrians are banned.
     pub is_motorway: bool,
     /// Whether it is a bus lane.
     pub for_buses: bool,
@@ -70,7 +70,7 @@ pub struct Lane {
     /// Where a stop or yield sign holds for this lane, by rising station. Empty where lights hold, too: they
     /// have precedence.
     pub sign_lines: Vec<SignLine>,
-    /// What signs say of a lane inside a junction; `Equal` for other lanes, and where lights stand.
+    /// The precedence that signs give a lane inside a junction; `Equal` for other lanes, and where lights stand.
     pub precedence: Precedence,
     pub(super) heights: Heights,
     /// Station of the road's reference line at each vertex of `centre`, m: rising or falling.
@@ -93,7 +93,7 @@ pub enum Side {
     Right,
 }
 
-/// What a lane does inside a junction; `Straight` everywhere else.
+/// The turn of a lane inside a junction; `Straight` everywhere else.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Turn {
     Straight,
@@ -216,7 +216,7 @@ pub struct Obstacle {
     pub place: LanePlace,
 }
 
-/// A building, a wall, a tree: something through which nobody walks.
+/// A building, a wall or a tree, which pedestrians do not walk through.
 #[derive(Debug, Clone)]
 pub struct Solid {
     /// Corners, in order.
@@ -250,7 +250,7 @@ pub struct RoadMap {
     pub obstacles: Vec<Obstacle>,
     /// Whether roads may pass over each other. If not, no heights need to be compared.
     pub has_levels: bool,
-    /// What was repaired, left out or not understood.
+    /// Repairs, and elements that were left out or not understood.
     pub warnings: Vec<String>,
     /// The places in the plane that warnings are about: index of the warning, position.
     pub warned_at: Vec<(usize, Vec2)>,
@@ -306,7 +306,7 @@ impl RoadMap {
         self.close_for_buses();
     }
 
-    /// A lane inside a junction from which only bus lanes go on is one too: nobody else turns into it.
+    /// A lane inside a junction from which only bus lanes go on is one too: no other vehicle turns into it.
     pub(super) fn close_for_buses(&mut self) {
         let leads_there = |lane: &Lane| {
             lane.junction.is_some()
@@ -354,8 +354,8 @@ impl RoadMap {
         Ok(LanePlace { lane: LaneIndex(index), station_m: candidate.station_of(s_m), offset_m: 0.0 })
     }
 
-    /// The middle of a lane on which nobody drives but people may be, in its direction, at a station of the road's reference line, and
-    /// whether that is the line's direction; `None` if there is none.
+    /// The middle of a lane where pedestrians may be but no vehicle drives, in its direction, at a station of the road's
+    /// reference line, and whether that is the line's direction; `None` if there is none.
     pub fn strip_pose(&self, road: &str, lane: i32, s_m: f64) -> Option<(Pose, bool)> {
         let holds = |strip: &&Strip| {
             let (first_m, last_m) = ends(&strip.road_stations_m);
@@ -380,8 +380,8 @@ impl RoadMap {
     /// fits `heading_rad` best.
     ///
     /// All lanes whose surface holds the point are equally near. Between them the heading decides, and a metre
-    /// off the centre weighs as much as a tenth of a radian: lanes of a junction lie over each other, and of
-    /// two with the same heading the one with the nearer centre is meant.
+    /// off the centre weighs as much as a tenth of a radian: lanes of a junction lie over each other. Of two
+    /// with the same heading, the lane with the nearer centre is meant.
     pub fn nearest(&self, point: Vec2, heading_rad: f64, reach_m: f64) -> Option<LanePlace> {
         let mut best: Option<(f64, f64, LanePlace)> = None;
         self.grid.visit(&self.lanes, point, reach_m, |index, projection| {
@@ -391,7 +391,7 @@ impl RoadMap {
             let turn_rad = wrap_angle(lane_heading_rad - heading_rad).abs();
             let misfit = turn_rad + MISFIT_RAD_PER_M * projection.distance_m;
             let is_better = best.is_none_or(|(best_m, best_misfit, found)| {
-                // Of two that fit alike the first counts.
+                // If two fit equally well, the first counts.
                 let fits_better = misfit < best_misfit || misfit == best_misfit && index < found.lane;
                 beyond_m < best_m - 1e-9 || beyond_m < best_m + 1e-9 && fits_better
             });

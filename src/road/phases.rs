@@ -1,7 +1,7 @@
 //! Phases of a junction: groups of lights whose traffic does not cross share a place in its cycle.
 //!
-//! A file says which lights switch together, and not which may be green at once; CARLA's maps give every light a
-//! controller of its own. Ways from opposite arms share a phase, as everywhere in towns: who turns across oncoming
+//! A file says which lights switch together, and not which may be green at once. CARLA's maps give every light a
+//! separate controller. Ways from opposite arms share a phase, as everywhere in towns: who turns across oncoming
 //! traffic gives way to it.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -53,7 +53,7 @@ pub fn share_phases(map: &mut RoadMap) {
         }
         for signal in &signals[index] {
             let signal = &mut map.signals[*signal];
-            // A group that holds no way stops nobody, whenever it is red.
+            // A group that holds no way stops no vehicle, whenever it is red.
             signal.group = phase_of.get(&signal.group).copied().unwrap_or(0);
         }
         map.junctions[index].groups = phases.len();

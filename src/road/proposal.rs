@@ -27,11 +27,11 @@ pub struct Proposal {
     pub goal: LanePlace,
     /// A few words: `left at 12`.
     pub title: String,
-    /// What the route holds.
+    /// The features of the route.
     pub reason: String,
 }
 
-/// What a route exercises. Routes are chosen for what those before lack.
+/// The features that a route exercises. Routes are chosen for what those before lack.
 type Traits = BTreeSet<(&'static str, &'static str)>;
 
 struct Candidate {

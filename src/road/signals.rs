@@ -63,7 +63,7 @@ pub fn add_signals(builder: &mut Builder) -> Result<(), RoadError> {
     Ok(())
 }
 
-/// What a signal of the file became: an index in the map's signals or in its signs.
+/// A signal of the file, as an index in the map's signals or in its signs.
 #[derive(Clone, Copy)]
 enum Found {
     Light(usize),
@@ -74,14 +74,14 @@ enum Found {
 struct Placed<'a> {
     /// By road and place among its signals.
     own: BTreeMap<(usize, usize), Found>,
-    /// What a reference or a controller means by an id: the first signal that has it.
+    /// The signal that a reference or a controller means by an id: the first that has it.
     by_id: BTreeMap<&'a str, Found>,
     /// For each light, its road and element.
     lights: Vec<(usize, &'a SignalElement)>,
 }
 
 impl Placed<'_> {
-    /// What holds at the place of a signal or of a reference to one. Lights for people on foot hold no lane.
+    /// The light or sign at the place of a signal or of a reference to one. Lights for people on foot hold no lane.
     fn of(&self, road: usize, place: usize, signal: &SignalElement) -> Option<Found> {
         if signal.reference {
             // It may point to a sign that was left out.
@@ -386,7 +386,7 @@ pub fn set_precedence<'a>(document: &'a Document, map: &mut RoadMap) {
 /// The roads that the `priority` records of a junction name: those that go first, and those that give way.
 type Records<'a> = (BTreeSet<&'a str>, BTreeSet<&'a str>);
 
-/// What the `priority` records of its junction say of a lane inside: they name its road or the road before it.
+/// The precedence of a lane by the `priority` records of its junction: they name its road or the road before it.
 fn recorded(records: &[Records], map: &RoadMap, index: LaneIndex) -> Precedence {
     let lane = map.lane(index);
     let Some(junction) = lane.junction else { return Precedence::Equal };

@@ -1,5 +1,5 @@
-//! What chooses rows: it sees what can be measured of a moment and the mask of legal rows, never the world or the driving
-//! system.
+//! The agents, which choose rows: they see measurable facts of a moment and the mask of legal rows, never the world or
+//! the driving system.
 //!
 //! - [`mdp`]: the state variables, the collision probability and the reward, with the paper's equation numbers.
 //! - [`agent`]: the agents, in a registry: by chance, learners, searches, and what a trained network or its rules choose.

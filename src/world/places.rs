@@ -1,8 +1,8 @@
 //! Whether a row finds a place: it is offered, as to an agent, at moments along each road on which it was found to run.
-//! No road is driven for that. The ego vehicle is put at stations of the route, at low speeds and at the limit, with
-//! the lights at several phases and no other road user. If a place is found, the row has one. If none is found, that is
-//! no proof: only some stations are tried, and a row may need traffic. What a rule asks of the moment is left to
-//! `prove`, which knows all moments of a route; only rules about the newcomer are asked here.
+//! No road is driven for that. The ego vehicle is put at stations of the route, at low speeds and at the limit. The
+//! lights are at several phases, and there is no other road user. If a place is found, the row has one. If none is
+//! found, that is no proof: only some stations are tried, and a row may need traffic. `prove` tests rules about the
+//! moment, because it knows all moments of a route; only rules about the newcomer are tested here.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -147,8 +147,7 @@ impl Lost<'_> {
         false
     }
 
-    /// If the row asks for a lane that is missing: the lanes beside the route that the map has but that no car drives
-    /// on, in words.
+    /// The lanes beside the route that the map has but no car drives on, in words, if the row asks for a missing lane.
     fn left_out(&self) -> Option<String> {
         let mut found = BTreeSet::new();
         for (road, counts) in &self.refusals {
@@ -195,7 +194,7 @@ fn without_place<'a>(
         let action = &space.actions[row.action];
         let asks =
             action.drawn().filter_map(|parameter| parameter.condition.as_ref()).any(|c| c.asks_the_world());
-        // Nobody is there to be ordered in the worlds that are searched.
+        // The worlds that are searched have no road user to order.
         let is_about_others = |effect: &EffectDef| match effect {
             EffectDef::Order(_) => true,
             EffectDef::Spawn(spawn) => spawn.of.is_some(),
@@ -203,7 +202,7 @@ fn without_place<'a>(
             EffectDef::Set(_) => false,
         };
         let orders = action.effects.iter().any(is_about_others);
-        // What a `where` asks of the moment cannot be left out, nor states that it decides.
+        // A `where` about the moment cannot be left out, nor can states that it decides.
         !asks
             && !orders
             && !space.depends_on_moment(row)

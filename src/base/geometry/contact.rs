@@ -1,7 +1,7 @@
 //! Distances between oriented boxes, rays, and the first contact of two moving boxes.
 //!
-//! All of it runs many times a tick, so it is written here rather than taken from a library: distances
-//! and rays are closed forms, the first contact advances along the gap. The tests below compare it with
+//! All of it runs many times a tick, so it is written here rather than taken from a library. Distances and
+//! rays are closed forms, and the first contact advances along the gap. The tests below compare it with
 //! `parry2d`, which only they use; `tests/it/contacts.rs` shows that no contact is missed.
 
 use super::extreme::{larger, smaller};

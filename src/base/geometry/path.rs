@@ -1,8 +1,8 @@
 //! Paths: polylines dense enough to be read as smooth curves.
 //!
-//! A path carries station, heading and curvature at each vertex. Between vertices the position is a
-//! chord with the heading interpolated; makers sample so densely that the chord is within a
-//! millimetre of the curve (see `road`), so no user of a path needs the curve itself.
+//! A path carries station, heading and curvature at each vertex. Between vertices the position is a chord
+//! with the heading interpolated. Makers sample so densely that the chord is within a millimetre of the curve
+//! (see `road`), so no user of a path needs the curve itself.
 //!
 //! Where a point lies beside a path can be asked in four ways:
 //!
@@ -154,10 +154,10 @@ const CORNER_RAD: f64 = 0.26;
 impl Path {
     /// A path through points that already know their heading and curvature.
     ///
-    /// Stations are measured anew as chord lengths from 0; points closer than 1 µm to their
-    /// predecessor are dropped. If such a point has another heading, the path turns there at once, and the
-    /// predecessor moves back a little: otherwise its heading would reach into the next segment.
-    /// `None` if fewer than two remain.
+    /// Stations are measured anew as chord lengths from 0; points closer than 1 µm to their predecessor are
+    /// dropped. If such a point has another heading, the path turns there at once, and the predecessor moves
+    /// back a little. Otherwise its heading would reach into the next segment. `None` if fewer than two
+    /// remain.
     pub fn new(samples: impl IntoIterator<Item = (Vec2, f64, f64)>) -> Option<Path> {
         let mut points: Vec<PathPoint> = Vec::new();
         for (position, heading_rad, curvature_per_m) in samples {

@@ -159,7 +159,7 @@ impl OrientedBox {
 }
 
 /// Length along the unit vector `along` and width across it, m, of a box of a size (length and width, m) that points
-/// along the unit vector `forward`. Of half the size it is half.
+/// along the unit vector `forward`. For a box of half the size both are half.
 #[inline]
 pub fn extent_m(forward: Vec2, along: Vec2, (length_m, width_m): (f64, f64)) -> (f64, f64) {
     let (cosine, sine) = (along.dot(&forward).abs(), along.perp(&forward).abs());

@@ -1,7 +1,7 @@
 //! The Intelligent Driver Model (Treiber, Hennecke and Helbing 2000): the gap that it wants, and what a smaller one costs.
 //!
 //! Other drivers, predictions and driving systems differ in their parameters and in what they do beyond comfort, each
-//! with its reason in its file; the terms here are the model's in all of them.
+//! with its reason in its file. The terms here are the model's in all of them.
 
 use crate::geometry::larger;
 
@@ -31,7 +31,7 @@ impl Following {
         self.wanted_gap_m(speed_mps, leader_mps) / larger(gap_m, 0.1)
     }
 
-    /// What a leader takes off the acceleration, m/s²: the model's interaction term `a (s*/s)²`.
+    /// The deceleration that a leader adds, m/s²: the model's interaction term `a (s*/s)²`.
     pub fn interaction_mps2(&self, speed_mps: f64, leader_mps: f64, gap_m: f64) -> f64 {
         let crowding = self.crowding(speed_mps, leader_mps, gap_m);
         self.acceleration_mps2 * crowding * crowding

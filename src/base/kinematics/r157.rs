@@ -1,6 +1,6 @@
 //! Figures of UN R157 (automated lane keeping): its careful driver, and the cut-in that a system must avoid.
 //!
-//! The models built on them are `ads::reference`'s. The regulation's fuzzy model has figures of its own there.
+//! The models built on them are `ads::reference`'s. The figures of the regulation's fuzzy model stand there, too.
 
 use super::GRAVITY_MPS2;
 

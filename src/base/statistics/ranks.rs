@@ -13,7 +13,7 @@ pub struct RankTest {
     /// The p-value, in `[0, 1]`.
     pub p: f64,
     /// Whether `p` comes from the exact distribution, that of all ways to part the same values into two such
-    /// samples; otherwise it comes from the normal one, with the variance corrected for ties and a continuity
+    /// samples. Otherwise it comes from the normal one, with the variance corrected for ties and a continuity
     /// correction of one half.
     pub exact: bool,
 }
@@ -48,8 +48,8 @@ pub struct PairedTest {
     pub p: f64,
 }
 
-/// Tests whether the first of two paired values tends to be the larger one; `None` without pairs, for samples of
-/// different size, and for more than 30 pairs, of which no study has so many.
+/// Tests whether the first of two paired values tends to be the larger one. `None` without pairs, for samples of
+/// different size, and for more than 30 pairs, which no study has.
 ///
 /// Equal pairs keep their ranks and take no sign (Pratt 1959).
 pub fn signed_ranks(first: &[f64], second: &[f64]) -> Option<PairedTest> {
@@ -80,8 +80,8 @@ pub fn signed_ranks(first: &[f64], second: &[f64]) -> Option<PairedTest> {
     })
 }
 
-/// The exact two-sided sign test: how probable it is that of the pairs that differ so unequal numbers, or more unequal
-/// ones, fall to either side by chance (McNemar's test in its exact form).
+/// The exact two-sided sign test (McNemar's test in its exact form): the probability that the differing pairs split by
+/// chance at least as unequally as here.
 pub fn sign_test(first: u64, second: u64) -> f64 {
     let all = (first + second) as f64;
     let of_all = libm::lgamma(all + 1.0) - all * core::f64::consts::LN_2;
@@ -155,9 +155,9 @@ fn normal_tail(first: usize, second: usize, u: f64, ties: &[usize]) -> f64 {
     0.5 * libm::erfc(z / core::f64::consts::SQRT_2)
 }
 
-/// Vargha and Delaney's Â12: how probable it is that a value of the first sample is the larger, ties half;
-/// with Newcombe's interval (2006, method 5), which is honest where the samples do not overlap at all. None
-/// if one is empty.
+/// Vargha and Delaney's Â12: the probability that a value of the first sample is the larger, ties half. With
+/// Newcombe's interval (2006, method 5), which is honest where the samples do not overlap at all. None if one
+/// is empty.
 pub fn superiority(first: &[f64], second: &[f64]) -> Option<(f64, Interval)> {
     if first.is_empty() || second.is_empty() {
         return None;
@@ -278,7 +278,7 @@ mod tests {
                 "{differences:?}: {test:?}"
             );
         }
-        // What a review found: the normal approximation gave 0.128 and 0.346, where no such values exist.
+        // A review found that the normal approximation gave 0.128 and 0.346, where no such values exist.
         assert_eq!(mann_whitney(&[1.0; 3], &[0.0; 2]).unwrap().p, 0.2);
         assert_eq!(mann_whitney(&[1.0], &[0.0; 3]).unwrap().p, 0.5);
         assert_eq!(signed_ranks(&[1.0, 2.0], &[1.0, 2.0]).unwrap().p, 1.0);

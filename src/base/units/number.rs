@@ -20,14 +20,14 @@ pub fn quantity(value: f64, dimension: Dimension) -> String {
     with_unit(decimal(value, false), &dimension.si_unit())
 }
 
-/// A quantity as people read it: in SI where it is short there, else in the first unit in which it is; in SI where it is
-/// short in none.
+/// A quantity as people read it: in SI where it is short there, else in the first unit in which it is short. If it is
+/// short in none, it stays in SI.
 pub fn quantity_short(value: f64, dimension: Dimension) -> String {
     quantity_in(value, dimension, unit_of_all(&[value], dimension))
 }
 
-/// The unit in which people read such quantities, if it is not SI's: where one is long in SI, the first in which each is
-/// short and reads back to the same f64 (`50 km/h` in place of `13.88888888888889 m/s`).
+/// The unit in which people read such quantities, if it is not SI's. Where one is long in SI, this is the first unit in
+/// which each is short and reads back to the same f64 (`50 km/h` in place of `13.88888888888889 m/s`).
 pub fn unit_of_all(values: &[f64], dimension: Dimension) -> Option<&'static Unit> {
     if values.iter().all(|&value| is_short(&decimal(value, false))) {
         return None;
@@ -48,8 +48,8 @@ pub fn quantity_if_short(value: f64, unit: &Unit) -> Option<String> {
     Some(with_unit(number_of(value, unit)?, unit.word))
 }
 
-/// The unit in which an author has probably written a number that has more than three decimals in SI: that in which it has
-/// fewest, and no more than in SI. `None` for SI's.
+/// The unit in which an author has probably written a number that has more than three decimals in SI. In this unit it has
+/// the fewest decimals, and no more than in SI. `None` for SI's.
 pub fn unit_as_written(value: f64, dimension: Dimension) -> Option<&'static Unit> {
     let decimals = |number: &str| number.split_once('.').map_or(0, |(_, decimals)| decimals.len());
     let in_si = decimals(&decimal(value, false));

@@ -1,7 +1,7 @@
 //! Exact fractions of 128-bit integers.
 //!
-//! Every operation that can leave the range gives `None` instead: the numbers of a scenario are a
-//! few digits long, so `None` means an absurd file, and the caller says so.
+//! Every operation that can leave the range gives `None` instead. The numbers of a scenario are a few digits
+//! long, so `None` means an absurd file, and the caller says so.
 
 use core::cmp::Ordering;
 use core::fmt;
@@ -89,8 +89,8 @@ impl Rational {
         })
     }
 
-    /// The simplest fraction whose nearest f64 is this one, among the convergents of its continued fraction: the number of
-    /// the source text that it was read from, if its denominator has up to six digits or so.
+    /// The simplest fraction whose nearest f64 is this one, among the convergents of its continued fraction. This is the
+    /// number of the source text that it was read from, if its denominator has up to six digits or so.
     ///
     /// A proof that took the f64 for exact would tell 30 km/h (25/3 m/s) from the limit of 30 km/h in a rule.
     pub fn from_rounded(value: f64) -> Option<Rational> {

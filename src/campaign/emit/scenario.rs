@@ -19,7 +19,7 @@ use avastra_world::sim::{ENGINE, TrafficProfile};
 
 use super::tree;
 
-/// What an emitted file says about its origin.
+/// The origin that an emitted file states.
 #[derive(Debug, Clone, Copy)]
 pub struct Provenance<'a> {
     /// The command that writes it, for example `run`.
@@ -75,7 +75,7 @@ pub fn unclaimed(table: &ActionTable, log: &EpisodeLog, headline: &str, source: 
     file(table, log, source, [look, headline], log.steps.len(), Vec::new())
 }
 
-/// What a reader can do with most files.
+/// The hint for the reader in most files.
 const REPLAY: &str = "replay with `avastra replay FILE`";
 
 fn file(
@@ -308,7 +308,7 @@ fn end(log: &EpisodeLog) -> Expect {
     tree::expect(tree::equal(tree::name("end"), tree::name(log.end.name())), Vec::new())
 }
 
-/// What is found, in a sentence for the reader.
+/// The finding, in a sentence for the reader.
 fn headline_of(space: &Space, log: &EpisodeLog, summary: &EpisodeSummary, about: Found) -> String {
     let what = match about {
         Found::Collision(index) => headline(space, log, &log.collisions[index]),
@@ -331,7 +331,7 @@ fn capitalised(text: &str) -> String {
     first.to_ascii_uppercase() + rest
 }
 
-/// What happens, in a sentence for the reader.
+/// The collision, in a sentence for the reader.
 fn headline(space: &Space, log: &EpisodeLog, collision: &Collision) -> String {
     let contact = &collision.contact;
     format!(

@@ -1,5 +1,5 @@
-//! What an episode has seen, tick by tick. The loop tells it of every tick and of who appears, and asks it who has been hit; a
-//! step's facts, and in the end the records, come out of it. Nothing here moves the world.
+//! The chronicle of an episode, tick by tick. The loop reports every tick and every new road user to it, and asks it which
+//! road users have been hit. It returns the facts of each step and, in the end, the records. Nothing here moves the world.
 
 use std::collections::BTreeMap;
 
@@ -22,13 +22,13 @@ pub(super) struct Near {
     pub body: Option<BodyWord>,
 }
 
-/// What was known as a step began.
+/// The facts that were known as a step began.
 pub(super) struct StepBegins {
     time_s: f64,
     collisions: usize,
 }
 
-/// What is left of an episode.
+/// The records of an episode after its end.
 pub(super) struct Records {
     pub held: Vec<Held>,
     pub collisions: Vec<Collision>,
@@ -41,7 +41,7 @@ pub(super) struct Records {
 
 #[derive(Clone)]
 pub(super) struct Chronicle {
-    // What later judgements depend on.
+    // Later judgements depend on these fields.
     /// The author's own bodies among the road users, by number.
     own_bodies: BTreeMap<u32, usize>,
     collisions: Vec<Collision>,
@@ -58,7 +58,7 @@ pub(super) struct Chronicle {
 }
 
 impl Chronicle {
-    /// Of an episode that begins in this world.
+    /// The chronicle of an episode that begins in this world.
     pub fn new(setup: &Setup, world: &World) -> Chronicle {
         let mut trails = Trails::default();
         trails.note(world);
@@ -90,7 +90,7 @@ impl Chronicle {
         StepBegins { time_s, collisions: self.collisions.len() }
     }
 
-    /// The facts of the step that began so, and its smallest margins. Of several collisions in a step, the first decides.
+    /// The facts of the step that began so, and its smallest margins. The first collision of a step decides.
     pub fn end_step(&mut self, begins: StepBegins, near: Near) -> (OutcomeFacts, &[f64]) {
         let met = begins.collisions;
         let facts = match self.collisions.get(met) {
@@ -106,7 +106,7 @@ impl Chronicle {
         &self.collisions
     }
 
-    /// Of every bit of the world up to now.
+    /// A digest of every bit of the world up to now.
     pub fn digest(&self) -> [u8; 32] {
         self.trace.digest()
     }
@@ -117,7 +117,7 @@ impl Chronicle {
         Records { held, collisions, incidents, breaches, margins, series, distance_m }
     }
 
-    /// What the driving system answered, before the world moves.
+    /// Notes the driving system's answer, before the world moves.
     pub fn note_answer(&mut self, world: &World, ads: &dyn Ads) {
         let status = ads.status();
         if self.held.last().is_none_or(|held| !held.still(status)) {

@@ -1,8 +1,8 @@
-//! What kind of collision a collision was, as far as it is known when it happens.
+//! The kind of a collision, as far as it is known when it happens.
 //!
-//! Sudden appearance is judged as in the published package; side and rear hits, which its authors sorted out by
-//! hand, are decided here by contact point and motion, unless the ego vehicle had to give way (`sim::right_of_way`):
-//! one that turns across oncoming traffic is hit in the flank, and is not the one that was run into. The package's
+//! Sudden appearance is judged as in the published package. Its authors sorted out side and rear hits by hand. Here contact
+//! point and motion decide them, unless the ego vehicle had to give way (`sim::right_of_way`). An ego vehicle that turns
+//! across oncoming traffic is hit in the flank, but it is not the vehicle that was run into. The package's
 //! "overlapping" cannot occur, because no obstacle appears within another's outline. Its "repeated" does not occur
 //! either, because an obstacle that was touched once touches nothing again; the word stays for worlds in which it
 //! can. Not taken over: that a second pedestrian of an episode never counts.
@@ -31,7 +31,7 @@ pub fn collision_facts(collision: &Collision, before: &[Collision]) -> OutcomeFa
         sudden: !ruling.is_ego_wrong() && collision.contact.time_s - collision.spawned_s <= SUDDEN_S,
         struck: !ruling.is_ego_wrong() && struck(&collision.contact, &VehicleParameters::MKZ),
         priority: ruling.priority,
-        // What was hit was nearest, and contact is certainty.
+        // The body that was hit was nearest, and contact is certainty.
         hit: Some(collision.body),
         near: Some(collision.body),
         proc: 1.0,
@@ -45,10 +45,9 @@ const CORNER_M: f64 = 1e-3;
 
 /// Whether the obstacle ran into the ego vehicle rather than the other way round, whoever had to give way.
 ///
-/// An obstacle that stands runs into nothing, so this is false for one. Otherwise it is true if the ego
-/// vehicle stood; if it was hit at the rear; if it was hit at the side behind its front axle, or before it by an
-/// obstacle moving towards that side; and at a front corner if the obstacle moved sideways onto it faster than the
-/// ego vehicle drove.
+/// A standing obstacle runs into nothing, so this is false for it. Otherwise it is true if the ego vehicle stood or was hit
+/// at the rear. It is true at the side behind the front axle, and before the axle if the obstacle moved towards that side.
+/// At a front corner it is true if the obstacle moved sideways onto the ego vehicle faster than the ego vehicle drove.
 pub fn struck(contact: &Contact, ego: &VehicleParameters) -> bool {
     if contact.obstacle_velocity_mps.norm() < STANDING_MPS {
         return false;

@@ -23,7 +23,7 @@ pub struct EpisodeLog {
     pub ads: String,
     /// Settings of the driving system, if it has any.
     pub profile: Option<ModularConfig>,
-    /// What an external driving system was asked and answered.
+    /// The requests to an external driving system, and its answers.
     pub conversation: Option<Arc<Conversation>>,
     /// Why an external driving system could not drive on.
     pub failure: Option<Failure>,
@@ -32,12 +32,12 @@ pub struct EpisodeLog {
     /// States of the space at the start.
     pub memory: Memory,
     pub steps: Vec<StepLog>,
-    /// What held the speed of the ego vehicle back, by rising time; each holds until the next one.
+    /// The reasons that limited the ego vehicle's speed, by rising time; each holds until the next one.
     pub held: Vec<Held>,
     pub collisions: Vec<Collision>,
     /// Contacts of obstacles with each other.
     pub incidents: Vec<Incident>,
-    /// What the ego vehicle did not keep of the space's requirements, by rising time.
+    /// The ego vehicle's breaches of the space's requirements, by rising time.
     pub breaches: Vec<Breach>,
     /// For each requirement in force.
     pub margins: Vec<Margin>,
@@ -53,7 +53,7 @@ pub struct EpisodeLog {
     pub ticks: u64,
 }
 
-/// What held the speed of the ego vehicle back, by what the driving system says of itself.
+/// The reason that limited the ego vehicle's speed, as the driving system states it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Held {
     /// From this time on, s.
@@ -64,7 +64,7 @@ pub struct Held {
 }
 
 impl Held {
-    /// What a driving system says at a time.
+    /// The reason that a driving system states at a time.
     pub(super) fn new(from_s: f64, status: &Status) -> Held {
         Held { from_s, reason: status.reason, reported: status.reported.clone() }
     }
@@ -104,7 +104,7 @@ pub struct StepLog {
     pub trace: [u8; 32],
 }
 
-/// What became of the agent's choice.
+/// The outcome of the agent's choice.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
     /// Carried out as drawn, `delay_ticks` after the step began; `spawned` has the ids of the road users that it made
@@ -117,7 +117,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// What it did to the world, in order.
+    /// Its effects on the world, in order.
     pub fn effects(&self) -> &[Effect] {
         match self {
             Outcome::Done { draw, .. } => &draw.effects,
@@ -188,7 +188,7 @@ impl EpisodeLog {
         })
     }
 
-    /// What held the speed back at a time, s; `None` before anything did.
+    /// The reason that limited the speed at a time, s; `None` before the first reason.
     pub fn held_at(&self, time_s: f64) -> Option<&Held> {
         // Times of contacts lie within a tick, which is driven by what is said at its beginning.
         self.held[..self.held.partition_point(|held| held.from_s <= time_s)].last()
@@ -275,7 +275,7 @@ pub enum End {
     StepLimit,
     /// The script of a replay has no more steps.
     Script,
-    /// An external driving system failed: a finding of its own, and no collision.
+    /// An external driving system failed: a separate finding, and no collision.
     Failed(FailureKind),
 }
 

@@ -9,13 +9,13 @@ use super::monitor::Monitor;
 pub struct MarginSeries {
     /// By index in `Space::requirements`.
     pub requirement: usize,
-    /// Of each tick from the first one up to the first contact, SI; `None` where nothing was asked, or where it was excused. What
-    /// `within` grants is not in it; of several road users it is that of the worst.
+    /// The margin at each tick from the first one up to the first contact, SI; `None` where nothing was asked, or where
+    /// it was excused. The time that `within` grants is not in it. Among several road users the worst margin counts.
     pub margins: Vec<Option<f64>>,
 }
 
 impl MarginSeries {
-    /// Of those that are asked and have a margin, before the first tick.
+    /// The empty series of the requirements that are asked and have a margin, before the first tick.
     pub(super) fn of_asked(monitor: &Monitor, space: &Space) -> Vec<MarginSeries> {
         let with_margin = monitor.asked().filter(|index| space.requirements[*index].margin.is_some());
         with_margin.map(|requirement| MarginSeries { requirement, margins: Vec::new() }).collect()

@@ -2,10 +2,10 @@
 //!
 //! A requirement with `within D` is breached at a tick if its condition failed at every tick of the D before it and at
 //! itself; its margin there is the largest one of these ticks. One unbroken stretch of such ticks is one breach. Nothing
-//! is asked where `when` does not hold, and what is asked only since less than D cannot be breached yet. A requirement `on`
-//! bodies is asked of each road user near, and all of this holds for each of them by itself. A requirement with `after` is
-//! breached D after that began to hold, if its condition failed at every tick from then on: a breach of that tick. Its margin
-//! is the largest one of these ticks.
+//! is asked where `when` does not hold. A requirement that has been asked for less than D cannot be breached yet. A
+//! requirement `on` bodies is asked of each road user near, and all of this holds for each of them by itself. A requirement
+//! with `after` is breached D after that began to hold, if its condition failed at every tick from then on: a breach of
+//! that tick. Its margin is the largest one of these ticks.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -56,21 +56,21 @@ pub struct Margin {
 #[derive(Debug, Clone)]
 pub(super) struct Monitor {
     watched: Watched,
-    /// Where everybody was, if that is asked for.
+    /// The places of all road users, if they are asked for.
     encroachment: Option<Encroachment>,
     /// The facts of the moment, filled anew at every tick.
     facts: WorldFacts,
     watches: Vec<Watch>,
     /// The requirements that nothing is asked of on this road, by index in `Space::requirements`.
     idle: Vec<usize>,
-    /// What of the moment, and of what is watched, they ask for.
+    /// The parts of the moment, and of the watched quantities, that they ask for.
     parts: Parts,
     /// The road users that requirements name, by index in `Space::bearers`.
     bearers: Vec<usize>,
     /// The bodies of the road users near of which they ask, by bit.
     asks_of: u32,
     breaches: Vec<Breach>,
-    /// Of each requirement the smallest margin of the step that ended last, if rewards ask for it; else NaN.
+    /// The smallest margin of each requirement in the step that ended last, if rewards ask for it; else NaN.
     of_step: Vec<f64>,
 }
 
@@ -89,7 +89,7 @@ struct Watch {
     asked: u32,
 }
 
-/// What of a requirement is looked at in every tick.
+/// The part of a requirement that is looked at in every tick.
 #[derive(Debug)]
 struct Required {
     /// By index in `Space::requirements`.
@@ -144,13 +144,13 @@ struct Tally {
     /// Ticks for which the window still holds a margin above the smallest one, which is not in it.
     above: u32,
     smallest: Option<f64>,
-    /// Of a requirement with `after`: the ticks at which that began to hold, by `asked`, for which no answer is due yet; and
-    /// the last one at which the condition held.
+    /// For a requirement with `after`, the ticks at which that began to hold, by `asked`, if no answer is due yet. Also the
+    /// last tick at which the condition held.
     begun: VecDeque<u32>,
     held: Option<u32>,
 }
 
-/// What the conditions of the watched requirements ask about.
+/// The quantities that the conditions of the watched requirements ask about.
 struct Questions {
     facts: Vec<Fact>,
     words: Vec<WordFact>,
@@ -298,7 +298,7 @@ impl Monitor {
         asked.map(|stretch| stretch.tally.now).filter(|margin| margin.is_finite()).reduce(f64::min)
     }
 
-    /// Ends a step. Of each requirement its smallest margin, if rewards ask for it; else NaN.
+    /// Ends a step. Returns the smallest margin of each requirement, if rewards ask for it; else NaN.
     pub fn end_step(&mut self) -> &[f64] {
         for watch in self.watches.iter_mut().filter(|watch| watch.required.is_paid) {
             let of_gone = watch.of_gone.take();
@@ -311,13 +311,13 @@ impl Monitor {
         &self.of_step
     }
 
-    /// What was found up to now, breaches by rising time.
+    /// The findings up to now, breaches by rising time.
     pub fn found(self) -> (Vec<Breach>, Vec<Margin>) {
         let margin = |watch: &Watch| {
             let all = watch.each.iter().chain([&watch.ego]);
             let past = smaller(watch.of_steps, watch.of_gone);
             let smallest = all.map(|stretch| stretch.tally.smallest).fold(past, smaller);
-            // Where nobody was near, `some` was as far as can be from holding, and `not some` from failing.
+            // With no road user near, `some` was as far as can be from holding, and `not some` from failing.
             let smallest = smallest.filter(|smallest| smallest.is_finite());
             Margin { requirement: watch.required.index, smallest, asked_s: f64::from(watch.asked) * DT_S }
         };
@@ -367,7 +367,7 @@ impl Watch {
         let is_meant = |near: &&NearFacts| near.is_of(&self.required.on);
         let mut asked: Vec<(u32, NpcFacts)> =
             near.iter().filter(is_meant).map(|near| (near.id, near.npc)).collect();
-        // Who is no longer near is asked nothing, and begins anew if it comes back.
+        // A road user that is no longer near is asked nothing, and begins anew if it comes back.
         let of_gone = &mut self.of_gone;
         self.each.retain(|stretch| {
             let id = stretch.obstacle.expect("each is about a road user");
@@ -438,7 +438,7 @@ impl Stretch {
 }
 
 impl Stretch {
-    /// Of a requirement that does not remember: the margin, whether it is a breach, and whether anything is asked.
+    /// For a requirement that does not remember: the margin, whether it is a breach, and whether anything is asked.
     #[inline]
     fn answer(
         &mut self,
@@ -451,7 +451,7 @@ impl Stretch {
         Some((margin, self.tally.failed > required.within_ticks, true))
     }
 
-    /// Of one that does.
+    /// The same for a requirement that remembers.
     #[inline(never)]
     fn answer_next(
         &mut self,
@@ -465,7 +465,7 @@ impl Stretch {
             let margin = self.tally.take(asked.kept, required.within_ticks, required.is_paid);
             return Some((margin, self.tally.failed > required.within_ticks, true));
         }
-        // What was not done in time is a breach of that moment.
+        // A missed deadline is a breach of that moment.
         self.open = None;
         let (margin, is_breached) = self.tally.respond(asked, required.within_ticks);
         Some((margin, is_breached, is_awaited || asked.begins))
@@ -621,7 +621,7 @@ mod tests {
         }
     }
 
-    /// What is not known yet does not hold, where the condition does not await it: its sign is all that is looked at there.
+    /// A fact that is not known yet does not hold, where the condition does not await it: only its sign is looked at there.
     const UNKNOWN: f64 = -0.5;
 
     fn made_up(rng: &mut rng::Rng, depth: u32, is_awaited: bool) -> MadeUp {
@@ -851,7 +851,7 @@ mod tests {
         }
     }
 
-    /// 10,000 requirements, each over a trace of its own, against a monitor that follows the definition.
+    /// 10,000 requirements, each over a separate trace, against a monitor that follows the definition.
     #[test]
     fn breaches_and_margins_are_those_of_a_naive_monitor() {
         const AT_ONCE: usize = 50;

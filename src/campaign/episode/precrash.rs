@@ -1,10 +1,10 @@
-//! The kind of a collision, as people who know crashes call it: the pre-crash types of NHTSA (Najm, Smith and Yanagisawa 2007,
-//! "Pre-Crash Scenario Typology for Crash Avoidance Research", DOT HS 810 767).
+//! The kind of a collision, in the terms of crash research: the pre-crash types of NHTSA. Source: Najm, Smith and Yanagisawa
+//! 2007, "Pre-Crash Scenario Typology for Crash Avoidance Research", DOT HS 810 767.
 //!
 //! The typology has 37 types, in an order in which the first that fits applies. It is about what both parties did before it
 //! became critical; here that is the last 5 s. How places, angles and speeds tell the types apart is ours. An evasive action goes
 //! before the types of lane changes, which it would be otherwise. Type 34 is incidents without a collision: here that is a load that
-//! falls onto the road. A vehicle that had crashed before is a kind of its own.
+//! falls onto the road. A vehicle that had crashed before is a separate kind.
 
 use avastra_base::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 use avastra_base::kinematics::STANDING_MPS;
@@ -33,7 +33,7 @@ const COMES_M: f64 = 0.5;
 /// A vehicle that was slower sideways, and has not changed lanes, drifts, m/s. Unintended departures are tested up to 0.6 m/s, lane
 /// changes are driven at 1 m/s and more. Ours.
 const CHANGES_MPS: f64 = 1.0;
-/// What would be reached later than this is passed and not evaded, s: a driver's reaction and braking. Ours.
+/// An obstacle that would be reached later than this is passed and not evaded, s: a driver's reaction and braking. Ours.
 const LATE_S: f64 = 2.5;
 /// A lead vehicle that has stood at so many steps has stopped, and is not stopping: two seconds. Ours.
 const STOOD_STEPS: usize = 5;
@@ -83,7 +83,7 @@ pub enum PreCrash {
     ObjectWithManoeuvre = 35,
     ObjectWithoutManoeuvre = 36,
     Other = 37,
-    /// With a vehicle that had crashed into somebody else before. No type of NHTSA's.
+    /// With a vehicle that had crashed into another road user before. No type of NHTSA's.
     Wreck,
 }
 
@@ -138,7 +138,7 @@ impl PreCrash {
     }
 }
 
-/// Where somebody was, and how it moved.
+/// Place and motion of a road user.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Place {
     pub pose: Pose,
@@ -156,7 +156,7 @@ impl Place {
     }
 }
 
-/// Where somebody was at a look, and what is there.
+/// The place of a road user at a look, and the road there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Step {
     pub place: Place,
@@ -176,7 +176,7 @@ impl Step {
     }
 }
 
-/// What somebody does beside driving on.
+/// A manoeuvre of a road user other than driving on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Manoeuvre {
     /// At a junction; a bend turns a vehicle, too, and is none.
@@ -185,12 +185,12 @@ pub(super) enum Manoeuvre {
     LaneChange,
 }
 
-/// What somebody did in the last seconds, and was about to do.
+/// The trail of a road user in the last seconds, and what it was about to do.
 #[derive(Debug, Clone)]
 pub(super) struct Way {
     /// One or more, the last one at the contact.
     pub steps: Vec<Step>,
-    /// What its route or its way has for it where it is, as far as that is known.
+    /// The manoeuvre that its route or its way requires where it is, as far as that is known.
     pub intends: Option<Manoeuvre>,
     /// Whether what it intends is known: of a vehicle that one of our drivers leads along lanes.
     pub is_known: bool,
@@ -339,8 +339,8 @@ impl Way {
         })
     }
 
-    /// The step from which it moves aside before somebody in its way, too late to pass; one that turns does not. `others`: where they
-    /// were at each step.
+    /// The step from which it moves aside before a road user in its way, too late to pass; a turning vehicle does not.
+    /// `others`: their places at each step.
     fn evades(&self, others: &[Vec<Place>]) -> Option<usize> {
         (0..self.steps.len()).find(|&step| {
             let own = self.steps[step].place;
@@ -359,7 +359,7 @@ impl Way {
     }
 }
 
-/// What led to a collision.
+/// The course of events that led to a collision.
 #[derive(Debug, Clone)]
 pub(super) struct Before {
     pub body: Body,
@@ -395,7 +395,7 @@ impl Before {
         if let Some(kind) = self.loses_control() {
             return kind;
         }
-        // Who runs into one ahead that came the same way does not do so because of a light or a sign.
+        // A vehicle that runs into one ahead that came the same way does not do so because of a light or a sign.
         if !self.is_rear_end() {
             if self.ran_red {
                 return PreCrash::RunningRedLight;
@@ -661,7 +661,7 @@ mod tests {
         let left = at_junction(before(turned));
         assert_eq!(left.kind(), PreCrash::LeftTurnAcrossPath);
         assert_eq!(Before { is_signalized: true, ..left }.kind().number(), Some(27));
-        // A bend is no turn, and who meet there come towards each other.
+        // A bend is no turn, and vehicles that meet there come towards each other.
         let mut bend = before([at(74.0, 73.0, -90.0, 12.0), at(54.0, 24.7, -135.0, 12.0)]);
         bend.ego.steps[1].place = at(50.0, 20.7, 45.0, 10.0);
         for way in [&mut bend.ego, &mut bend.other] {
@@ -772,7 +772,7 @@ mod tests {
         parks.other.steps[0].off_road_m = 0.8;
         assert_eq!(parks.kind(), PreCrash::Parking);
 
-        // A vehicle beside the ego vehicle comes over because somebody stands before it: late, or in good time.
+        // A vehicle beside the ego vehicle moves into its lane because a road user stands before it: late, or in good time.
         let comes = |stands_m: f64| {
             let mut before = before([at(10.0, 3.5, 0.0, 10.0), at(52.0, 1.0, 0.0, 9.0)]);
             before.other.steps[0].place.velocity_mps.y = -1.5;

@@ -1,7 +1,7 @@
-//! What an episode looks like from outside the vehicles, tick by tick: the way of each road user, sky, lights and contacts.
+//! An episode as seen from outside the vehicles, tick by tick: the way of each road user, sky, lights and contacts.
 //!
-//! One recorder for all that shows an episode again: exports, pages and pictures. What goes on inside the driving system
-//! is left to those that show it.
+//! One recorder for all that shows an episode again: exports, pages and pictures. It leaves out the state of the driving
+//! system; the exports, pages and pictures that show it add it themselves.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -44,7 +44,7 @@ pub struct Recorder {
 pub struct Actor {
     /// As claims number it; 0 is the ego vehicle.
     pub id: u32,
-    /// What it is like, in the engine's words.
+    /// Its body, in the engine's words.
     pub body: Body,
     pub shape: BodyParameters,
     /// As it was when it appeared; `None` for the ego vehicle.
@@ -246,7 +246,7 @@ impl Actor {
         }
     }
 
-    /// What other tools call it: `ego`, or `npc_3` for the one that claims call `npc#3`.
+    /// Its name in other tools: `ego`, or `npc_3` for the road user that claims call `npc#3`.
     pub fn name(&self) -> String {
         if self.id == 0 { "ego".to_owned() } else { format!("npc_{}", self.id) }
     }
@@ -270,7 +270,7 @@ impl Actor {
         changes > 0 && self.brake_lights[changes - 1].1 && tick <= self.last_tick()
     }
 
-    /// What it shows at a tick.
+    /// Its lights at a tick.
     pub fn lights_at(&self, tick: u64) -> ShownLights {
         let changes = self.lights.partition_point(|(from, _)| *from <= tick);
         changes.checked_sub(1).map_or(ShownLights::Off, |last| self.lights[last].1)

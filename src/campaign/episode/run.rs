@@ -21,7 +21,7 @@ const PROGRESS_M_MIN: f64 = 1.0;
 /// Called after every tick with the world, the driving system and the contacts that began.
 pub type Watch<'a> = dyn FnMut(&World, &dyn Ads, &[Contact]) + 'a;
 
-/// What is known when an action is chosen.
+/// The facts that are known when an action is chosen.
 pub struct Moment<'a> {
     pub step: usize,
     pub observation: &'a Observation,
@@ -30,7 +30,7 @@ pub struct Moment<'a> {
 }
 
 impl<'a> Moment<'a> {
-    /// What the episode is made of.
+    /// The setup of the episode.
     pub fn setup(&self) -> &'a Setup {
         &self.play.setup
     }
@@ -62,7 +62,7 @@ impl<'a> Moment<'a> {
     }
 }
 
-/// What is to happen in a step.
+/// The choice for a step.
 pub enum Choice {
     Act(Draw),
     /// The action is judged and carried out when its trigger says so, if that comes within the step.
@@ -88,13 +88,13 @@ impl Choice {
         }
     }
 
-    /// The choice of a row with given values. Of several refusals the first counts.
+    /// The choice of a row with given values. The first of several refusals counts.
     pub fn judged(row: usize, judged: Result<Draw, Vec<Refusal>>) -> Choice {
         Choice::of(row, first(judged))
     }
 }
 
-/// Of several refusals the first.
+/// The offer, with the first of several refusals.
 fn first(judged: Result<Draw, Vec<Refusal>>) -> Offer {
     judged.map_err(|mut refusals| refusals.swap_remove(0))
 }
@@ -148,7 +148,7 @@ pub fn run_from(
     play.into_log(end)
 }
 
-/// What became of the choice of a step when the step began.
+/// The outcome of the choice of a step when the step began.
 enum Begun {
     With(Outcome),
     Waiting(Waiting),
@@ -226,7 +226,7 @@ impl Play {
         }
     }
 
-    /// What is seen before the next choice.
+    /// The observation before the next choice.
     ///
     /// # Errors
     /// The end of the episode, if its driving system cannot drive any more.
@@ -237,7 +237,7 @@ impl Play {
         Ok(self.observation())
     }
 
-    /// What is seen now.
+    /// The observation now.
     pub fn observation(&self) -> Observation {
         Observation::new(&self.world, self.ads.status())
     }
@@ -262,7 +262,7 @@ impl Play {
         self.end()
     }
 
-    /// What the episode is made of.
+    /// The setup of the episode.
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
@@ -308,7 +308,7 @@ impl Play {
         Outcome::Done { draw, spawned, delay_ticks }
     }
 
-    /// What every step does, in a step without an action.
+    /// Applies the effects that every step has, in a step without an action.
     fn wait(&mut self) {
         let (effects, memory) = self.setup.table.wait(&self.situation());
         for effect in effects {
@@ -342,8 +342,8 @@ impl Play {
         self.steps.push(step);
     }
 
-    /// Drives for one observation period, or until the goal or the end of the map. What became of the step's action, and how
-    /// near a collision was at most.
+    /// Drives for one observation period, or until the goal or the end of the map. Returns the outcome of the step's
+    /// action, and how near a collision was at most.
     fn drive(&mut self, mut begun: Begun, watch: &mut Watch) -> (Outcome, Near) {
         let mut near: Option<Near> = None;
         let shift = self.setup.period_shifts.get(self.steps.len()).copied().unwrap_or(0);
@@ -500,7 +500,7 @@ mod tests {
 
     use super::*;
 
-    /// What was called, in order.
+    /// The calls, in order.
     type Tape = Arc<Mutex<Vec<&'static str>>>;
 
     fn note(tape: &Tape, what: &'static str) {

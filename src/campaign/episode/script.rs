@@ -8,7 +8,7 @@ use avastra_world::action::{ActionTable, Draw, Refusal, Situation};
 use super::log::{EpisodeLog, Outcome};
 use super::run::{Choice, Moment};
 
-/// What happens in each step, from step 0; `None` is a step without an action.
+/// The action of each step, from step 0; `None` is a step without an action.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Script {
     pub steps: Vec<Option<ScriptedAction>>,
@@ -59,8 +59,8 @@ impl Script {
         Script { steps }
     }
 
-    /// The choice at a moment: the recorded action under the rules of the run, or its refusal; an action that has a
-    /// moment of its own is judged then.
+    /// The choice at a moment: the recorded action under the rules of the run, or its refusal. An action with a separate
+    /// moment is judged at that moment.
     pub fn choose(&self, moment: &Moment) -> Choice {
         match self.steps.get(moment.step) {
             None => Choice::Stop,

@@ -1,8 +1,8 @@
 //! The shape of a way up to a collision, in one word.
 //!
 //! Coarse on purpose: it separates failures and does not describe them. It looks at the last 5 s (up to 5.5 s), or less in a
-//! younger episode: how far the vehicle has turned, how far it has moved aside, how much of its speed is left. A
-//! bend of the road is a turn like one at a junction. The bounds are ours.
+//! younger episode. It asks how far the vehicle has turned, how far it has moved aside, and how much of its speed is left.
+//! A bend of the road is a turn like one at a junction. The bounds are ours.
 
 use avastra_base::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 

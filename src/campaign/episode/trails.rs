@@ -1,4 +1,4 @@
-//! Where everybody was in the last seconds, as far as the kind of a collision asks.
+//! The places of all road users in the last seconds, as far as the kind of a collision asks.
 
 use core::ops::Range;
 use std::collections::VecDeque;
@@ -119,7 +119,7 @@ impl Trails {
 /// A vehicle no farther before a junction begins its turn, m. Ours.
 const BEGINS_M: f64 = 3.0;
 
-/// What the route has for the ego vehicle where it is.
+/// The manoeuvre that the route requires of the ego vehicle where it is.
 fn ego_intends(world: &World) -> Option<Manoeuvre> {
     let station_m = world.ego_station_m();
     let moment = world.moment_facts();
@@ -223,8 +223,8 @@ fn lights(map: &RoadMap, way: &Way, half_length_m: f64) -> Vec<Passed> {
     passed
 }
 
-/// The stretches of lanes from one place to another that its lane leads to, within half a second; beside it, as after a change of
-/// the lane, that of the new lane from where the vehicle was beside it.
+/// The stretches of lanes from one place to another that its lane leads to, within half a second. If the other place is
+/// beside the lane, as after a lane change: the stretch of the new lane from where the vehicle was beside it.
 fn stretches(map: &RoadMap, before: &LanePlace, after: &LanePlace) -> Vec<(LaneIndex, Range<f64>)> {
     if before.lane == after.lane {
         return vec![(before.lane, before.station_m..after.station_m)];

@@ -1,7 +1,7 @@
 //! Two driving systems in the same episodes (common random numbers): which one crashes more often?
 //!
-//! Each pair of episodes has one start, one seed of traffic and sensors, and the same draws of the agent as long as both
-//! worlds are alike. What both do alike says nothing about the difference; so pairs tell two versions of one system
+//! Each pair of episodes has one start and one seed of traffic and sensors. The agent draws the same values as long as both
+//! worlds are equal. Events that both share say nothing about the difference. So pairs tell two versions of one system
 //! apart in far fewer kilometres than two separate counts.
 
 use std::sync::atomic::AtomicBool;
@@ -36,7 +36,7 @@ pub struct Pair {
     pub second: Side,
 }
 
-/// What a comparison found.
+/// The result of a comparison.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct ComparisonResults {
     /// Raised whenever a field changes its meaning or goes away.

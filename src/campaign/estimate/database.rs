@@ -31,7 +31,7 @@ const LAYOUT: Layout = Layout {
     ],
 };
 
-/// What a pilot saw stands under a part that no estimate has.
+/// The part number of the pilot's observations, which no estimate has.
 pub const PILOT: i64 = -1;
 
 /// `levels` is 0 always: a method that is gone counted them, and a table without the column would have another layout.
@@ -86,7 +86,7 @@ impl Units for EstimateDatabase {
     }
 
     fn called(number: i64) -> String {
-        // The pilot is stored as a part with a number of its own.
+        // The pilot is stored as a part with a reserved number.
         if number == PILOT { "the pilot".to_owned() } else { format!("part {number}") }
     }
 }
@@ -154,7 +154,7 @@ impl EstimateDatabase {
         Ok(())
     }
 
-    /// What a pilot saw, if there was one.
+    /// The pilot's observations, if there was a pilot.
     ///
     /// # Errors
     /// If the file cannot be read.

@@ -1,12 +1,12 @@
-//! How often would it crash: the probability of an event in an episode under the odds that a space and an agent state,
-//! and the rate in 1,000 km, with intervals.
+//! How often would it crash? The probability of an event in an episode under the odds that a space and an agent state, and
+//! the rate in 1,000 km, with intervals.
 //!
-//! An [`Estimate`] consists of independent parts, each with seeds of its own, played on any number of threads. A part
-//! counts ([`Method::Count`]: crude Monte Carlo) or tries rows out beside those that chance chooses ([`Method::Probe`]: importance
-//! sampling, see `probing` and `plan`). Both are unbiased if the number of parts is fixed. Rules that stop early ([`Stopping`]) bias
-//! the probability a little, since they look at it or at what goes with it; the interval stays valid, because the looks share
-//! what it may miss (Bonferroni). What is gained over counting is printed. [`Comparison`] plays two driving systems in the
-//! same episodes.
+//! An [`Estimate`] consists of independent parts, each with its own seeds, played on any number of threads. A part counts
+//! ([`Method::Count`]: crude Monte Carlo), or it also tries rows that chance did not choose ([`Method::Probe`]: importance
+//! sampling, see `probing` and `plan`). Both are unbiased if the number of parts is fixed. Rules that stop early
+//! ([`Stopping`]) bias the probability a little, since they look at it or at related figures. The interval stays valid,
+//! because the looks share the chance of a miss (Bonferroni). The gain over counting is printed. [`Comparison`] plays two
+//! driving systems in the same episodes.
 
 mod compare;
 mod database;

@@ -19,7 +19,7 @@ pub struct Part {
     pub number: u32,
 }
 
-/// What a part found.
+/// The result of a part.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PartRecord {
     pub part: Part,

@@ -1,10 +1,10 @@
 //! Which rows are worth trying out, beside the one that chance chooses: what a pilot found, and the shares that follow.
 //!
 //! A row that chance chooses with probability p, and that is tried out besides with probability π, is seen with
-//! probability p + π − pπ. Its events weigh p / (p + π − pπ) (Horvitz and Thompson 1952), which is at most 1: where
-//! nothing is tried out, this is counting, and no plan can make the estimate worse than its own cost.
+//! probability p + π − pπ. Its events weigh p / (p + π − pπ) (Horvitz and Thompson 1952), which is at most 1. Where
+//! nothing is tried out, this is counting. No plan can make the estimate worse than its own cost.
 //!
-//! If h is the probability of the event after a row, the variance is about the sum of p² h / (p + π), and the cost is that of
+//! If h is the probability of the event after a row, the variance is about the sum of p² h / (p + π). The cost is that of
 //! the episode and of all trials. The product is least at π = p (√(h / λ) − 1) with one λ for all rows (Neyman 1934). The
 //! pilot estimates h, each figure drawn towards that of its row on all roads and of all rows.
 
@@ -34,7 +34,7 @@ pub struct Cell {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Situation(pub(super) u32);
 
-/// What a pilot saw of a cell.
+/// A pilot's observations of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Seen {
     /// Times that the row was carried out.
@@ -47,7 +47,7 @@ pub struct Seen {
     pub chance: f64,
 }
 
-/// What a pilot saw.
+/// A pilot's observations.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Pilot {
     pub cells: BTreeMap<Cell, Seen>,
@@ -63,7 +63,7 @@ pub struct Plan {
     risks: Risks,
     /// A row whose risk is higher is tried out; `None`: none is.
     threshold: Option<f64>,
-    /// Number of trials at each moment that are spread over all rows alike, whatever their risk. A pilot learns from
+    /// Number of trials at each moment that are spread evenly over all rows, whatever their risk. A pilot learns from
     /// these.
     even: f64,
 }
@@ -146,7 +146,7 @@ impl Pilot {
 }
 
 impl Plan {
-    /// A plan that tries every row alike, `trials` times at each moment on average.
+    /// A plan that tries every row equally often, `trials` times at each moment on average.
     pub fn even(trials: f64) -> Plan {
         Plan { even: trials, ..Plan::default() }
     }
@@ -229,7 +229,7 @@ mod tests {
         1.0 - libm::pow(1.0 - of_step, STEPS as f64)
     }
 
-    /// An episode of the twin with its trials: its weighted events. What a simulator would find out, it draws.
+    /// An episode of the twin with its trials: its weighted events. It draws the results that a simulator would find out.
     /// `heaviest` is raised to the weight of what could have been met.
     fn sample(plan: &Plan, rng: &mut Rng, pilot: &mut Pilot, heaviest: &mut f64) -> f64 {
         let (mut weights, mut is_over) = (0.0, false);
@@ -287,7 +287,7 @@ mod tests {
         let share = |row, situation| plan.share(&cell(row, situation), CHANCES[row], 4);
         assert!(share(0, 1) > 20.0 * CHANCES[0], "{}", share(0, 1));
         assert_eq!(plan.share(&cell(0, 1), 0.0, 4), 0.0);
-        // What the pilot has not seen is as its row is, or as all rows are.
+        // A cell that the pilot has not seen is like its row, or like all rows.
         let rarely = |row, situation| plan.share(&cell(row, situation), 1e-5, 4);
         assert!(rarely(0, 0) < rarely(0, 7) && rarely(0, 7) < rarely(0, 1), "{}", rarely(0, 7));
         assert!(rarely(9, 1) < rarely(0, 7), "{}", rarely(9, 1));

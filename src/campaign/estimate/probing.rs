@@ -1,13 +1,13 @@
-//! Importance sampling of rows, by trials beside the episode: what a pilot found dangerous is tried out more often than
-//! chance would choose it, and weighs as much less.
-//! An episode is played by chance. At each step some of the rows that were not chosen are tried out: each in a copy of
-//! the moment, with the values that were drawn for it anyway, and then played on by chance. An event belongs to the
+//! Importance sampling of rows, by trials beside the episode: rows that a pilot found dangerous are tried out more often
+//! than chance would choose them, and weigh as much less.
+//! An episode is played by chance. At each step some of the rows that were not chosen are tried out. Each is tried in a
+//! copy of the moment, with the values that were drawn for it anyway, and then played on by chance. An event belongs to the
 //! step in which the road user that was hit appeared (or was hit, if no action made it appear). A trial counts only
-//! events of its own step, so each event is looked for in one step alone, and the steps add up to all events, without
+//! events of the trial's step. So each event is looked for in one step alone, and the steps add up to all events, without
 //! bias, whatever the plan. A trial ends when the event came, or when nothing is left of what its row made appear.
 //!
-//! A trial shares all seeds with its episode, so it is an episode of its own seed with another script: what it finds is written
-//! as a scenario like any other. `plan` says how rows are chosen for trials, and where the weights come from.
+//! A trial shares all seeds with its episode, so it is an episode of the same seed with another script. Its findings are
+//! written as scenarios like any other. `plan` says how rows are chosen for trials, and where the weights come from.
 
 use std::sync::atomic::AtomicBool;
 
@@ -23,9 +23,9 @@ use crate::estimate::part::{Event, Part, PartRecord};
 use crate::estimate::plan::{Cell, Pilot, Plan, Situation, weight};
 use crate::estimate::ready::{Estimate, EventPlace};
 
-/// Rounds of a pilot. The first tries all rows alike; each later one uses what the rounds before it found. Ours.
+/// Rounds of a pilot. The first tries all rows equally often; each later one uses what the rounds before it found. Ours.
 const ROUNDS: u32 = 3;
-/// Trials at each moment of a pilot that are spread over all rows alike: in the first round, and later. Ours.
+/// Trials at each moment of a pilot that are spread evenly over all rows: in the first round, and later. Ours.
 const EVEN_FIRST: f64 = 1.0;
 const EVEN_LATER: f64 = 0.25;
 /// Episodes of a round on each road: this share of those that the estimate has, and at least so many. Ours.
@@ -48,7 +48,7 @@ struct Considered {
     weight: f64,
 }
 
-/// What a pilot saw, from which a plan follows; `None` if it was stopped.
+/// A pilot's observations, from which a plan follows; `None` if it was stopped.
 pub fn pilot(estimate: &Estimate, threads: usize, stop: &AtomicBool) -> Option<Pilot> {
     let settings = estimate.settings();
     let episodes = f64::from(settings.parts) * f64::from(settings.run.episodes) * ROUND_SHARE;
@@ -137,7 +137,7 @@ fn sampled(
             pilot.note(chosen.cell, own.is_some_and(|own| own.step == number));
         }
     }
-    // What begins after the event has it behind itself already.
+    // A step that begins after the event has it behind itself already.
     let until = own.map_or(steps.len(), |own| own.hit_step + 1);
     if let Some(EventPlace { step, .. }) = own {
         on(steps.get(step).and_then(|step| step.chosen), step, log);

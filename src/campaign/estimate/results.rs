@@ -1,4 +1,4 @@
-//! What an estimate found: probabilities and rates with their intervals, and where the probability lies.
+//! The results of an estimate: probabilities and rates with their intervals, and where the probability lies.
 //!
 //! Computed from the parts alone. While some are missing, the result covers those that are there, and says so.
 
@@ -9,7 +9,7 @@ use avastra_base::statistics::{Interval, binomial_missing, bisect, weighted};
 use crate::estimate::part::{Event, Part, PartRecord};
 use crate::estimate::settings::{EstimateSettings, EventKind, Method};
 
-/// What a rate of an estimate is one of.
+/// The population that an estimate's rates refer to.
 pub const FRAME: &str = "these are rates of the episodes of this space, which searches for trouble, with every road as often as any \
                          other: no rates on the road";
 
@@ -44,7 +44,7 @@ pub struct RoadEstimate {
     pub estimate: Probability,
 }
 
-/// What a row on a road contributes.
+/// The contribution of a row on a road.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Mass {
     pub road: String,
@@ -90,14 +90,14 @@ pub struct Probability {
 /// Effective events, or parts with the event, from which on a gain is told. Ours.
 const GAIN_EVENTS_MIN: f64 = 10.0;
 
-/// What the results are made of.
+/// The input of the results.
 #[derive(Debug, Clone, Copy)]
 pub struct Found<'a> {
     pub records: &'a [PartRecord],
     pub events: &'a [(Part, Event)],
     /// Everything that a pilot simulated before, s.
     pub pilot_s: f64,
-    /// What the table calls its rows.
+    /// The labels of the table's rows.
     pub labels: &'a [String],
 }
 
@@ -270,7 +270,7 @@ fn counted_episodes(probability: f64, Interval { low, high }: Interval, missing:
         let found = weighted(probability, probability / episodes, 1.0 / episodes, missing);
         found.high.unwrap_or(1.0) - found.low <= width
     };
-    // From one episode to more than anybody counts.
+    // From one episode to more than any estimate counts.
     libm::exp(bisect(0.0, 30.0, is_narrow))
 }
 

@@ -10,7 +10,7 @@ use avastra_lang::syntax::{listed, nearest};
 use crate::estimate::part::Part;
 use crate::estimate::results::Probability;
 
-/// What is counted: whether it happens in an episode. In words `counted`, `collision`, `breach`, or the name of a requirement.
+/// The counted event: whether it happens in an episode. In words `counted`, `collision`, `breach`, or a requirement's name.
 #[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(from = "String", into = "String")]
 pub enum EventKind {
@@ -77,7 +77,7 @@ impl EventKind {
         matches!(self, EventKind::Breach | EventKind::Requirement(_))
     }
 
-    /// What so many of them are called, after their number.
+    /// The noun for several of them, after their number.
     pub fn noun(&self) -> &'static str {
         match self {
             EventKind::Counted => "counted",
@@ -141,8 +141,8 @@ pub struct EstimateSettings {
     pub run: RunSettings,
 }
 
-/// When an estimate has played enough. It looks when a quarter, half and all of the parts are done, on every road; what it
-/// finds between two looks does not count, so the result depends on no number of threads.
+/// When an estimate has played enough. It looks when a quarter, half and all of the parts are done, on every road. Results
+/// between two looks do not count, so the result depends on no number of threads.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Stopping {
     /// Stops when half the width of the interval is at most this share of the probability.

@@ -1,36 +1,35 @@
 //! Could a careful driver have avoided this collision?
 //!
-//! The world is taken back to the *takeover*: the onset of the hazard (see `hazard`), or the last moment at which an ego
-//! vehicle that had to give way could still stop, if that is earlier, but no further than 8 s. All other road users then move as
-//! recorded until the recorded contact, and after it as they themselves decide. The ego vehicle, the same car on the same
-//! road, is driven by each reference driver in turn, at most as fast as a careful driver would have been there (`lawful`). A
-//! driver watches for 2 s before it takes over, and knows from the first which lane changes of the route are begun or over, and
-//! whom the ego vehicle has seen at a crosswalk.
+//! The world is taken back to the *takeover*, by 8 s at most. The takeover is the onset of the hazard (see `hazard`). If the
+//! ego vehicle had to give way, it is the last moment at which it could still stop, if that is earlier. All other road users
+//! then move as recorded until the recorded contact, and after it as they themselves decide. The ego vehicle is the same car
+//! on the same road. Each reference driver in turn drives it, at most as fast as a careful driver would have been there
+//! (`lawful`). A driver watches for 2 s before it takes over. It knows from the first which lane changes of the route are
+//! begun or over, and which pedestrians the ego vehicle has seen at a crosswalk.
 //!
 //! 1. The careful drivers drive from the takeover.
-//! 2. If none of them avoids the collision, and the ego vehicle slowed down to walking pace since, they drive from its slowest
-//!    moment: a vehicle that has dealt with the hazard and then drives on into what stands before it could have stayed.
+//! 2. If none of them avoids the collision, and the ego vehicle slowed down to walking pace since, they drive from its
+//!    slowest moment. A vehicle that has dealt with the hazard and then drives on into an obstacle could have stayed.
 //! 3. If still none avoids it, evasive manoeuvres are tried, which begin at the takeover without any delay.
 //!
-//! **Shoves.** If another road user shoved the ego vehicle, so that most of its way to the contact was the shove's, the takeover
-//! is when a careful driver has reacted to the shove: before it there was nothing to avoid.
+//! **Shoves.** If a shove from another road user gave the ego vehicle most of its way to the contact, the takeover is when a
+//! careful driver has reacted to the shove. Before the shove there was nothing to avoid.
 //!
-//! **Giving way.** Where the ego vehicle had to give way, a driver that takes over before it has begun a lane change begins none
-//! without a look aside: the question is whether staying in the lane would have avoided the collision.
+//! **Giving way.** Where the ego vehicle had to give way, a driver that takes over before it has begun a lane change begins
+//! none without a look aside. The question is whether staying in the lane would have avoided the collision.
 //!
-//! **Hit from behind.** Where another vehicle ran into the rear of the ego vehicle, no driver goes faster than that did, or leaves
-//! the way that it took: a vehicle need not flee from one behind it, which keeps the distance.
+//! **Hit from behind.** Where another vehicle ran into the rear of the ego vehicle, no driver goes faster than the ego
+//! vehicle did, or leaves the way that it took. A vehicle need not flee from one behind it, which keeps the distance.
 //!
-//! Beside that, each careful driver is asked to the letter of UN R157 (`r157_letter`): from the first conflict of ways
-//! on, the ego vehicle drives along its recorded path at its recorded speed until the model reacts, and then only
-//! brakes. The regulation speaks of a
-//! vehicle that keeps its lane and speed on a motorway. A careful driver in a town does more: it slows down for
-//! bends and for those that have priority before there is a risk. So the first replay counts, and the letter is
-//! reported: where only the first avoids a collision, foresight was missing rather than a reaction.
+//! Beside that, each careful driver is asked to the letter of UN R157 (`r157_letter`). From the first conflict of ways on,
+//! the ego vehicle drives along its recorded path at its recorded speed until the model reacts. Then it only brakes. The
+//! regulation speaks of a vehicle that keeps its lane and speed on a motorway. A careful driver in a town does more: it
+//! slows down for bends and for road users that have priority before there is a risk. So the first replay counts, and the
+//! letter is reported. Where only the first avoids a collision, foresight was missing rather than a reaction.
 //!
-//! A driver avoids the collision if until 4 s after the recorded contact it does not touch the obstacle,
-//! and does not run into any other road user. A contact in which another road user runs into the ego
-//! vehicle does not count, because recorded road users do not give way to a car that is now elsewhere.
+//! A driver avoids the collision if, until 4 s after the recorded contact, it does not touch the obstacle and runs into no
+//! other road user. If another road user runs into the ego vehicle, that contact does not count: recorded road users do not
+//! give way to a car that is now elsewhere.
 
 use std::collections::VecDeque;
 
@@ -133,7 +132,8 @@ pub fn judge_with_drives(
     })
 }
 
-/// What a reference driver does from its takeover on, until it is clear, touches something, or leaves the way that it has to keep.
+/// The drive of a reference driver from its takeover until it is clear, touches something, or leaves the way that it has
+/// to keep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReferenceDrive {
     pub name: String,
@@ -636,7 +636,7 @@ mod tests {
         assert!(
             slower.throttle_pct == 0.0 && (slower.brake_pct - pedals_for(-COMFORTABLE_MPS2).1).abs() < 1e-9
         );
-        // What brakes harder by itself is left alone.
+        // A vehicle that brakes harder by itself is left alone.
         let brakes = Case::slowed(
             &Case {
                 recording: &[],

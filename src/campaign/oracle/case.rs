@@ -1,8 +1,8 @@
 //! One finding of an episode, a collision or a breach, found again in other plays of the same scenario.
 //!
 //! An obstacle is known by the step and the effect that made it appear, because its number depends on
-//! which other steps were carried out. What comes after the finding's own step is left out of every
-//! play; one step without an action is added, so that what only comes later is still seen.
+//! which other steps were carried out. Steps after the finding's own step are left out of every
+//! play. One step without an action is added, so that a finding that only comes later is still seen.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use super::avoidable::judge;
 use super::counted::counted_at_need;
 use crate::episode::at_fault;
 
-/// What was found in an episode.
+/// A finding of an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Found {
     /// By index among the collisions of the log.
@@ -33,7 +33,7 @@ impl Found {
         }
     }
 
-    /// What it is called.
+    /// Its noun.
     pub fn noun(self) -> &'static str {
         match self {
             Found::Collision(_) => "crash",
@@ -42,7 +42,7 @@ impl Found {
     }
 }
 
-/// What became of a finding in another play.
+/// The fate of a finding in another play.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fate {
@@ -136,7 +136,7 @@ pub(super) struct Case<'a> {
     pub what: What,
 }
 
-/// What must be found again.
+/// The finding that must be found again.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum What {
     Collision {
@@ -183,7 +183,7 @@ impl<'a> Case<'a> {
         play(&setup, choose).0
     }
 
-    /// What another play made of it.
+    /// Its fate in the log of another play.
     pub fn fate(&self, log: &EpisodeLog) -> Fate {
         let is_same = match self.what {
             What::Collision { .. } => {

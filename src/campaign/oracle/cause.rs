@@ -1,18 +1,18 @@
 //! Which module of a driving system is at fault for a collision or a breach: the replays that show it.
 //!
 //! The ego vehicle drives as it did until the obstacle appears (before a breach, until 15 s before it). From then on the same system drives with one
-//! module changed (`ads::Module`), which has watched from the start, so that the hazard is the same to the bit;
-//! other road users decide for themselves. The changes are:
+//! module changed (`ads::Module`), which has watched from the start, so that the hazard is the same to the bit.
+//! Other road users decide for themselves. The changes are:
 //!
-//! - each module alone is made as in the baseline, and made free of errors; and all of them together are;
-//! - each documented weakness alone is switched off;
-//! - the module's errors are left alone: all others are as in the baseline, or free of errors;
-//! - two modules together, if no change alone prevents the collision, told apart from chance.
+//! - Each module alone is made as in the baseline, and made free of errors. So are all of them together.
+//! - Each documented weakness alone is switched off.
+//! - The module's errors are left alone: all others are as in the baseline, or free of errors.
+//! - Two modules are changed together, if no change alone prevents the collision, told apart from chance.
 //!
 //! A change that prevents the collision is played again with other sensor noise, and so is the noise alone, to tell the
 //! change apart from chance. `evidence` draws the conclusions.
 //!
-//! In what follows "collision" stands for the finding, whichever it is. Left out: errors from before the obstacle appeared.
+//! Below, "collision" stands for the finding, also for a breach. Left out: errors from before the obstacle appeared.
 
 use std::sync::Arc;
 
@@ -46,7 +46,7 @@ pub struct NoModules {
     pub ads: String,
 }
 
-/// What becomes of a finding of a log if another profile of the driving system takes over.
+/// The fate of a finding of a log if another profile of the driving system takes over.
 ///
 /// # Errors
 /// If the driving system has no modules.
@@ -94,7 +94,7 @@ impl<'a> Inquiry<'a> {
         Ok(Inquiry { case, profile, foresight, from_s })
     }
 
-    /// What becomes of the collision if another profile takes over when its obstacle appears.
+    /// The fate of the collision if another profile takes over when its obstacle appears.
     pub fn fate(&self, profile: &ModularConfig) -> Fate {
         // The same settings make the same drive.
         if *profile == self.profile {
@@ -163,7 +163,7 @@ impl<'a> Inquiry<'a> {
         evidence
     }
 
-    /// What one module has to do with the collision.
+    /// The part of one module in the collision.
     fn finding(&self, module: Module, baseline: &ModularConfig) -> ModuleFinding {
         let own = self.profile;
         let restored = own.with_module_of(module, baseline);

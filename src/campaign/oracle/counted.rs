@@ -1,4 +1,4 @@
-//! What kind of collision each collision of a log was, and which of them count.
+//! The kind of each collision of a log, and which of them count.
 //!
 //! The rule that combines these facts into "counted" is the space's own `verdict`.
 

@@ -17,14 +17,14 @@
 //! **Verdict.** The first of these that holds, see [`Verdict`]:
 //!
 //! 1. Some modules differ from the baseline, and one of them, made as in the baseline, prevents the collision, told apart
-//!    from chance. If several do, the one whose errors alone lead to the collision most often is named, and with it each
-//!    that the replays do not tell apart from it: whichever of them is mended, the collision is gone.
+//!    from chance. If several do, the verdict names the module whose errors alone lead to the collision most often, and
+//!    each module that the replays do not tell apart from it. Mending any one of them prevents the collision.
 //! 2. None differs, and a documented weakness, switched off, prevents the collision, told apart from chance.
 //! 3. No change alone is told apart from chance, and two modules together prevent the collision, told apart from it.
 //! 4. None differs, a module's output was beyond its specification in the seconds before (see `measured`), and the module
-//!    prevents the collision without its errors, told apart from chance. Beyond its specification alone is no proof: so is
-//!    some module before many a near miss, and where other noise prevents the collision anyway, another draw of any
-//!    module's errors would have, too. The table shows what was measured all the same.
+//!    prevents the collision without its errors, told apart from chance. An output beyond its specification alone is no
+//!    proof: it occurs before many near misses, too. Where other noise prevents the collision anyway, another draw of any
+//!    module's errors would have, too. The table shows the measurements all the same.
 //! 5. None differs, and a module that decides (planning, control, emergency braking) prevents the collision without its
 //!    errors, told apart from chance; of several as above.
 //! 6. None differs, and a module that gives planning its picture prevents the collision without its errors, told apart from
@@ -46,7 +46,7 @@ const MISSING: f64 = 0.05;
 /// The cause of a collision, with the evidence for it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Diagnosis {
-    /// The module at fault; several if they are not told apart, or if only both together prevent the collision; none
+    /// The module at fault. Several if they are not told apart, or if only both together prevent the collision. None
     /// where the verdict says why.
     pub cause: Vec<Module>,
     pub verdict: Verdict,
@@ -64,7 +64,7 @@ pub enum Verdict {
     Outside,
     /// The driving system is the baseline, and a documented weakness of the module makes the collision.
     Weakness,
-    /// The driving system is the baseline. What the module gave in the seconds before was beyond its specification, and
+    /// The driving system is the baseline. The module's output in the seconds before was beyond its specification, and
     /// without its errors it prevents the collision.
     Measured,
     /// The driving system is the baseline, and without its errors the module prevents the collision.
@@ -84,7 +84,7 @@ pub enum Verdict {
 /// The results of all replays of a collision.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Evidence {
-    /// What is explained: `crash` or `breach`. In the other fields "collision" stands for it.
+    /// The noun of the explained finding: `crash` or `breach`. In the other fields "collision" stands for it.
     pub noun: &'static str,
     pub modules: Vec<ModuleFinding>,
     /// The collision if all modules are as in the baseline; `None` if the driving system is the baseline.

@@ -15,7 +15,7 @@
 //!
 //! The way is the one that the ego vehicle took, as wide as the vehicle and the 0.375 m by which careful drivers
 //! wander (UN R157, Annex 4, Appendix 3). An obstacle heads for it if at constant velocity it would meet it before
-//! the contact. Both compare places alone, not times: a driver may see that two ways cross before it is
+//! the contact. Both compare places alone, not times. A driver may see that two ways cross before it is
 //! clear which vehicle will be there first.
 
 use avastra_base::geometry::{OrientedBox, Pose, distance_m};
@@ -67,7 +67,7 @@ pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<Ons
             && (0..=left.div_ceil(STRIDE)).any(|step| {
                 let mut then = other.outline;
                 then.pose.position += other.velocity_mps * (step * STRIDE) as f64 * DT_S;
-                // What stands beside the way wanders no more.
+                // An obstacle that stands beside the way wanders no more.
                 way.iter().any(|ego| near(ego, &then, if stands { 0.0 } else { WANDER_M }))
             });
         if !conflicts && !is_out_of_order(world, other) {

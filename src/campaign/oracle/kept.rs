@@ -2,10 +2,10 @@
 //!
 //! A careful driver drives the same steps from the start of the episode, under the same rules: an action happens at the
 //! same time with the same values, if it is legal there, too. Most requirements are about the drive up to then rather
-//! than about a last moment, so the question begins at the start, and not at a hazard as that of a collision does. Who
-//! comes to the same place a little later must keep it there, too: the question ends one step after that of the breach. Up
-//! to then the careful driver must not have breached the requirement. One that touches somebody before the moment of the breach
-//! has not come to it, and is left out.
+//! than about a last moment. So the question begins at the start, and not at a hazard as for a collision. A driver that
+//! comes to the same place a little later must keep it there, too: the question ends one step after the step of the breach.
+//! Up to then the careful driver must not have breached the requirement. A driver that touches a road user before the
+//! moment of the breach has not come to it, and is left out.
 
 use std::cmp::Ordering;
 
@@ -16,7 +16,7 @@ use avastra_drivers::Selected;
 use super::avoidable::CAREFUL;
 use super::recurrence::Recurrence;
 
-/// A requirement that the ego vehicle did not keep, and who would have.
+/// A requirement that the ego vehicle breached, and the careful drivers that would have kept it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Breached {
     /// By index in `Space::requirements`.

@@ -11,8 +11,8 @@
 //! | tracking | longest time in which it was not known, s | whether it was detected | publication, and the time that looks take |
 //! | prediction | error of the most probable future after a second, m | see [`Forecast::error_m`] | half a lane, ours |
 //!
-//! Draws within the specification exceed these bounds now and then: that a module was so far off in these seconds
-//! says that it had bad luck, or that its specification allows too much. Left out: planning, control and emergency
+//! Draws within the specification exceed these bounds now and then. Such an error says that the module had bad luck, or
+//! that its specification allows too much. Left out: planning, control and emergency
 //! braking, whose output has no truth to compare with, and latency, which is a constant of the settings.
 
 use crate::episode;
@@ -41,7 +41,7 @@ pub struct Measure {
     /// In words, for example `longest time not detected, s`.
     pub what: &'static str,
     pub worst: f64,
-    /// What the specification leaves room for.
+    /// The largest error that the specification leaves room for.
     pub bound: f64,
 }
 
@@ -64,7 +64,7 @@ pub(super) fn measure(case: &Case, own: &ModularConfig, baseline: &ModularConfig
     gauge.measures(own, baseline)
 }
 
-/// What was seen of one obstacle so far.
+/// The observations of one obstacle so far.
 #[derive(Default)]
 struct Gauge {
     obstacle: u32,

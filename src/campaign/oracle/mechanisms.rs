@@ -19,7 +19,7 @@ use super::cause::{Inquiry, NoModules};
 /// Number of replays with other sensor noise, of each crash and each weakness.
 const NOISES: u32 = 8;
 
-/// What becomes of a crash without each documented weakness that is switched on.
+/// The fate of a crash without each documented weakness that is switched on.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Mechanisms {
     /// Share of the replays with other sensor noise alone in which the crash vanishes.

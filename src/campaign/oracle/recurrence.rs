@@ -1,7 +1,7 @@
 //! How often a finding happens again under other chance.
 //!
-//! One seed's crash is a candidate. The same scenario is played with other errors of the driving system's sensors, and with
-//! others who look at the world at other moments, so that they react by up to 0.1 s sooner or later; all else stays.
+//! One seed's crash is a candidate. The same scenario is played with other errors of the driving system's sensors. The other
+//! road users look at the world at other moments, so that they react by up to 0.1 s sooner or later. All else stays.
 //! (`variation` changes the scenario, too.) A driving system of ours whose sensors have no noise (all but `modular`) meets other
 //! reactions alone. One that is not deterministic meets its own chance, too, which no replay can tell from the noise.
 
@@ -25,7 +25,7 @@ pub struct Recurrence {
     pub replays: u32,
 }
 
-/// What is added to a recurrence where the driving system need not repeat itself.
+/// The remark on a recurrence where the driving system need not repeat itself.
 pub const MIXED: &str = "the program is not deterministic, so this mixes its chance with the noise";
 
 impl Recurrence {
@@ -55,7 +55,7 @@ impl Recurrence {
     }
 }
 
-/// What follows a text about recurrence where chance of the program is mixed in; nothing elsewhere.
+/// The text after a recurrence where chance of the program is mixed in; nothing elsewhere.
 pub fn mixed_text(is_mixed: bool) -> String {
     if is_mixed { format!("; {MIXED}") } else { String::new() }
 }

@@ -1,14 +1,14 @@
 //! How hard a collision was.
 //!
 //! Delta-v is the change of velocity of a perfectly inelastic impact of two bodies across the gap that closes:
-//! `m2 / (m1 + m2)` of the speed at which it closes where they meet. What slides along the contact changes nothing,
+//! `m2 / (m1 + m2)` of the speed at which it closes where they meet. Sliding along the contact changes nothing,
 //! so a scrape at 20 m/s is no crash at 20 m/s. Both are taken to be hit in line with their centres; an impact
 //! beside them turns the bodies and changes their velocity less, so this is an upper bound. The world carries the same
 //! impact out (`world::step::contact`), as far as a car can follow: neither backwards nor sideways.
 //!
-//! What that means for people is told in three classes ([`Harm`]), by the speed at which one in ten is seriously injured
-//! (MAIS 3 and more). Such speeds describe whole populations of people and cars, so they order findings, and tell of no
-//! single crash what came of it.
+//! Three classes ([`Harm`]) give the harm to people, by the speed at which one in ten is seriously injured (MAIS 3 and
+//! more). Such speeds describe whole populations of people and cars. So they order findings, and do not tell the outcome
+//! of a single crash.
 
 use crate::episode::Collision;
 use avastra_base::geometry::Vec2;
@@ -40,7 +40,7 @@ pub struct Severity {
     pub harm: Harm,
 }
 
-/// What an impact means for people.
+/// The harm of an impact to people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Harm {
@@ -66,9 +66,9 @@ impl Harm {
 const PEDESTRIAN_MPS: f64 = 29.0 / 3.6;
 const CYCLIST_MPS: f64 = 44.0 / 3.6;
 const MOTORCYCLIST_MPS: f64 = 48.0 / 3.6;
-/// The same among cars, m/s, front to front and front to side: Campolettano and others ("TARGET setting for high severity
-/// collisions", Traffic Safety Research), from crashes in the United States. Front to rear they have 126 km/h for those in
-/// front; the front's speed holds for those behind.
+/// The same among cars, m/s, front to front and front to side, from crashes in the United States. Source: Campolettano and
+/// others, "TARGET setting for high severity collisions", Traffic Safety Research. Front to rear they have 126 km/h for
+/// people in front; the front's speed holds for people behind.
 const FRONT_MPS: f64 = 99.0 / 3.6;
 const SIDE_MPS: f64 = 73.0 / 3.6;
 /// Walking pace, m/s. Ours.
@@ -83,7 +83,7 @@ fn harm(severity: &Severity, body: Body) -> (f64, f64) {
         Body::Pedestrian => (severity.closing_speed_mps, PEDESTRIAN_MPS),
         Body::Bicycle => (severity.closing_speed_mps, CYCLIST_MPS),
         Body::Motorcycle => (severity.closing_speed_mps, MOTORCYCLIST_MPS),
-        // Of animals and things it is the ego vehicle's own people that count.
+        // In a crash with an animal or a thing, the people in the ego vehicle count.
         Body::Animal
         | Body::Object
         | Body::BoxTruck

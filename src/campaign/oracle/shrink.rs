@@ -2,10 +2,10 @@
 //!
 //! Fewest actions first (ddmin, Zeller and Hildebrandt 2002), then fewest steps, ambient vehicles, delays
 //! and effects, then the plainest start (noon under a clear sky) and values; all passes repeat until nothing
-//! changes. Every candidate is played, and every action in it must be legal by the rules of the space. The
-//! crash is the same if the ego vehicle hits an obstacle with the same body and verb, its pre-crash type, harm, priority and
-//! the class of the verdict are the same, and the space's verdict still counts it, or still does not. A breach is the same if
-//! it is one of the same requirement, and a careful driver still keeps that, or still none does.
+//! changes. Every candidate is played, and every action in it must be legal by the rules of the space. The crash is the same
+//! if body and verb of the obstacle, pre-crash type, harm, priority and the class of the verdict are the same. The space's
+//! verdict must also still count it, or still not. A breach is the same if it is one of the same requirement, and a careful
+//! driver still keeps that, or still none does.
 //!
 //! It must recur, too, as far as that was tried. A smaller candidate may recur less often, down to the lower end of the 95 %
 //! interval of what is shrunk, and what recurs (`Recurrence::recurs`) still does. For a rounder number nothing is traded: it
@@ -40,7 +40,7 @@ pub struct Shrunk {
     pub log: EpisodeLog,
     /// One for each collision of the log.
     pub judgements: Vec<Judgement>,
-    /// What was kept, in the log.
+    /// The finding that was kept, in the log.
     pub found: Found,
     /// How often what was shrunk recurs, if that was asked.
     pub recurrence_before: Option<Recurrence>,
@@ -48,7 +48,7 @@ pub struct Shrunk {
     pub plays: u32,
 }
 
-/// What makes a finding worth keeping.
+/// The figures that make a finding worth keeping.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Worth {
     /// When it happens, s since the episode began.
@@ -140,8 +140,9 @@ pub fn shrink(
     }
 }
 
-/// Steps that are not needed for the nth collision of a log: each alone could be removed, or replaced by waiting, and
-/// the collision stays the same, and its recurrence in `replays` replays within its interval. Empty if the scenario is 1-minimal.
+/// Steps that are not needed for the nth collision of a log. Each alone could be removed, or replaced by waiting: the
+/// collision stays the same, and its recurrence in `replays` replays within its interval. Empty if the scenario is
+/// 1-minimal.
 pub fn spare_steps(
     setup: &Setup,
     log: &EpisodeLog,
@@ -164,7 +165,7 @@ pub fn spare_steps(
     (0..steps).filter(is_spare).collect()
 }
 
-/// What is made smaller.
+/// A scenario that is made smaller.
 #[derive(Debug, Clone, PartialEq)]
 struct Candidate {
     script: Script,
@@ -173,7 +174,7 @@ struct Candidate {
 }
 
 impl Candidate {
-    /// What led to a finding in a log.
+    /// The scenario that led to a finding in a log.
     fn of(setup: &Setup, log: &EpisodeLog, found: Found) -> Candidate {
         let mut script = Script::of_log(log);
         script.steps.truncate(found.step(log) + 1);
@@ -188,7 +189,7 @@ struct Kept {
     found: Found,
 }
 
-/// What must stay.
+/// The properties that must stay.
 enum Wanted {
     Crash {
         body: BodyWord,
@@ -203,7 +204,7 @@ enum Wanted {
     },
 }
 
-/// What a candidate is for.
+/// The purpose of a candidate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Purpose {
     /// Fewer or simpler parts.
@@ -216,7 +217,7 @@ enum Purpose {
 struct Search<'a> {
     setup: &'a Setup,
     wanted: Wanted,
-    /// What is shrunk, and how hard it is.
+    /// The log that is shrunk, and how hard its finding is.
     log: &'a EpisodeLog,
     found: Found,
     worth: Worth,
@@ -542,7 +543,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// What the rules make of a wish for one value.
+    /// The value that the rules allow for a wish for one value.
     fn reached(&mut self, best: &Candidate, step: usize, wish: &ScriptedAction, index: usize) -> Option<f64> {
         self.plays += 1;
         let log = self.play(best, Some((step, wish)));

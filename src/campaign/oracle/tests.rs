@@ -52,7 +52,7 @@ fn judged(event: impl Fn(&mut World)) -> Judgement {
     judged_in(world(), event)
 }
 
-/// As [`judged`], in a world of its own.
+/// As [`judged`], in a given world.
 fn judged_in(world: World, event: impl Fn(&mut World)) -> Judgement {
     let (recording, contact, met) = crashed(world, event);
     let recent = &recording[recording.len().saturating_sub(500)..];
@@ -176,7 +176,7 @@ fn un_r157_puts_the_border_of_a_standing_pedestrian_at_24_m() {
     assert_eq!(stands(28.0), Avoidability::Avoidable);
 }
 
-/// On a wet road nobody brakes with the 7.6 m/s² of a dry one, to the letter of the regulation either.
+/// On a wet road no vehicle brakes with the 7.6 m/s² of a dry one, to the letter of the regulation either.
 #[test]
 fn the_letter_of_un_r157_brakes_no_harder_than_the_road_allows() {
     let letter = |wet: Level, distance_m: f64| {

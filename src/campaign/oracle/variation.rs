@@ -1,11 +1,13 @@
 //! Small changes of a scenario, and how often it crashes, or breaches a requirement, under them.
 //!
-//! On a street, no value of a scenario repeats to the last digit. A variation changes, each by its own
-//! draw: when an action happens (normal, 0.1 s, cut at 0.3 s; the first stays at the start), every
-//! speed that an action draws (normal, 2 %, cut at 6 %), the phase of the signals (normal, 0.1 s, cut
-//! at 0.3 s), and all errors of the driving system's sensors, which are drawn anew. What the rules set
-//! follows from the changed values, and values stay within the rules. The widths are ours: how much
-//! repetitions of one manoeuvre may differ on a proving ground.
+//! On a street, no value of a scenario repeats to the last digit. A variation changes each of these by its own draw:
+//! - the time of an action: normal, 0.1 s, cut at 0.3 s (the first action stays at the start);
+//! - every speed that an action draws: normal, 2 %, cut at 6 %;
+//! - the phase of the signals: normal, 0.1 s, cut at 0.3 s;
+//! - all errors of the driving system's sensors, which are drawn anew.
+//!
+//! Values that the rules set follow from the changed values, and values stay within the rules. The widths are ours: how
+//! much repetitions of one manoeuvre may differ on a proving ground.
 
 use std::sync::Arc;
 

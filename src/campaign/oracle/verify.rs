@@ -14,7 +14,7 @@ use super::kept::Breached;
 use super::recurrence::Recurrence;
 use super::{facts, unmet};
 
-/// Of a claim about a breach where there is none.
+/// The text for a claim about a breach where there is none.
 const NO_BREACH: &str = "kept, or not in force";
 
 /// One claim, and what the replay says of it.
@@ -24,7 +24,7 @@ pub struct ClaimResult {
     pub claim: String,
     /// None if it could not be tried.
     pub confirmed: Option<bool>,
-    /// What the replay found instead, or `as claimed`; why it was not tried.
+    /// The replay's finding instead, or `as claimed`; or why it was not tried.
     pub found: String,
 }
 
@@ -43,7 +43,7 @@ pub struct NoTries;
 pub struct Replays<'a> {
     /// The modules at fault.
     pub cause: &'a dyn Fn(usize) -> Result<Vec<Module>, NoModules>,
-    /// What was breached, and who would have kept it; `None` if that is not tried.
+    /// The breached requirements, and the drivers that would have kept them; `None` if that is not tried.
     pub breached: &'a dyn Fn() -> Option<Vec<Breached>>,
     /// How often a finding happens again under other chance, in so many replays.
     pub recurrence: &'a dyn Fn(Found, u32) -> Result<Recurrence, NoTries>,
@@ -65,7 +65,7 @@ pub fn verify(
     steps.chain(scenario.claims.iter().map(|claim| played.check(claim))).collect()
 }
 
-/// What claims are held against.
+/// The replay against which claims are checked.
 #[derive(Clone, Copy)]
 struct Played<'a> {
     space: &'a Space,

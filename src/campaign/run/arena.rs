@@ -103,7 +103,7 @@ impl Arena {
         self.ads.program()
     }
 
-    /// What identifies an external driving system.
+    /// The identity of an external driving system.
     pub fn attached(&self) -> Option<Attached> {
         Some(self.ads.program()?.attached())
     }
@@ -178,7 +178,7 @@ pub fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) 
     (offers.choice(row), legal)
 }
 
-/// What each row would do now. A row is judged when somebody asks for it.
+/// The offers of all rows at this moment. A row is judged when a caller asks for it.
 pub(crate) struct Offers<'a> {
     moment: &'a Moment<'a>,
     shares: Vec<f64>,
@@ -202,7 +202,7 @@ impl<'a> Offers<'a> {
         agent.choose(observation, self, &mut rng)
     }
 
-    /// What becomes of the step with that row.
+    /// The choice of that row for the step.
     pub fn choice(mut self, row: Option<usize>) -> Choice {
         row.map_or(Choice::Pass, |row| {
             self.is_legal(row);
@@ -215,12 +215,12 @@ impl<'a> Offers<'a> {
         self.all().unwrap_or_else(|| Array1::from_elem(self.rows(), false))
     }
 
-    /// What was drawn, by row: nothing for a row that is refused or was not judged.
+    /// The draws, by row: nothing for a row that is refused or was not judged.
     pub fn draws(&self) -> impl Iterator<Item = Option<&Draw>> {
         self.judged.iter().map(|offer| offer.as_ref()?.as_ref().ok())
     }
 
-    /// What was judged, by row.
+    /// The judged offers, by row.
     pub fn judged(&self) -> &[Option<Offer>] {
         &self.judged
     }

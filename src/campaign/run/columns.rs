@@ -18,9 +18,9 @@ pub struct Column {
 /// The values of a column, one for each row.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
-    /// What is missing is NaN.
+    /// A missing value is NaN.
     Real(Vec<f64>),
-    /// What is missing is -1; no column has negative numbers.
+    /// A missing value is -1; no column has negative numbers.
     Integer(Vec<i64>),
     Text(Vec<Option<String>>),
 }

@@ -1,9 +1,9 @@
-//! What a run or a training did, in more detail than its totals: rows on roads, and the episodes of a training.
+//! The course of a run or a training, in more detail than its totals: rows on roads, and the episodes of a training.
 
 use crate::run::database::Database;
 use crate::run::sealed::{DatabaseError, of_columns, query_all};
 
-/// What became of a row on a road.
+/// The outcomes of a row on a road.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct CoverageCell {
     pub road: String,
@@ -13,7 +13,7 @@ pub struct CoverageCell {
     pub refused: i64,
     pub chosen: i64,
     pub realised: i64,
-    /// What refused it most often.
+    /// The reason that refused it most often.
     pub why: Option<String>,
 }
 

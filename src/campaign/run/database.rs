@@ -65,9 +65,9 @@ pub(crate) const LAYOUT: Layout = Layout {
     ],
 };
 
-/// `step.top_speed_mps` is the ego vehicle's greatest speed in the step before the first contact, NULL after it;
-/// `step.others_crashed` whether other road users crashed into each other in it.
-/// `held` says what held the speed of the ego vehicle back, from the row's time to that of the next row. `offer`
+/// `step.top_speed_mps` is the ego vehicle's greatest speed in the step before the first contact, NULL after it.
+/// `step.others_crashed` says whether other road users crashed into each other in it.
+/// `held` says what limited the speed of the ego vehicle, from the row's time to that of the next row. `offer`
 /// counts, per episode and row, the steps in which the row was legal (`reason` 0) or refused (other reasons); training
 /// writes nothing there. `breach.kept_by` has the careful drivers that keep the
 /// requirement, NULL where none was asked (in a training). `recurred` of `replays` under other chance found the same, NULL where
@@ -250,7 +250,7 @@ impl Database {
         Ok(steps.into_iter().sum())
     }
 
-    /// What became of each row of the table, by its number, over all episodes. A row for which no agent asked is
+    /// The outcomes of each row of the table, by its number, over all episodes. A row for which no agent asked is
     /// absent.
     ///
     /// # Errors
@@ -279,7 +279,7 @@ impl Database {
         Ok(rows)
     }
 
-    /// What went wrong with an external driving system, by what it was; the most frequent first.
+    /// The failures of an external driving system, by their kind; the most frequent first.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -450,7 +450,7 @@ pub struct RequirementCount {
     pub breaches: i64,
     /// Episodes with a breach of it.
     pub breached_in: i64,
-    /// Of these, episodes in which careful drivers were tried, and in which one would have kept it.
+    /// Among these, episodes in which careful drivers were tried, and in which one would have kept it.
     pub tried_in: i64,
     pub kept_in: i64,
     /// The smallest margin of all episodes, in the unit; `None` if it has none or was never asked.
@@ -469,7 +469,7 @@ pub struct RefusalCount {
     pub times: i64,
 }
 
-/// What went wrong with an external driving system, how often, and the first time.
+/// A failure of an external driving system: how often it happened, and the first time.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct FailureCount {
     pub kind: String,
@@ -481,7 +481,7 @@ pub struct FailureCount {
     pub scenario: String,
 }
 
-/// What a run has found so far.
+/// The results of a run so far.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Totals {
     pub episodes: i64,

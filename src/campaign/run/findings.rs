@@ -1,4 +1,4 @@
-//! What a run found, by how sure and how bad it is.
+//! The findings of a run, by how sure and how bad they are.
 
 use core::cmp::Ordering;
 use std::collections::BTreeSet;
@@ -7,7 +7,7 @@ use crate::oracle::Recurrence;
 use crate::run::database::{Database, from_columns};
 use crate::run::sealed::{DatabaseError, query_all};
 
-/// What [`FoundIn::finding`] is where it is no requirement.
+/// The value of [`FoundIn::finding`] where it is no requirement.
 pub const COLLISION: &str = "collision";
 
 /// An episode with a collision or a breach.
@@ -17,12 +17,12 @@ pub struct FoundIn {
     pub episode: i64,
     /// Whether it has a counted collision or a breach. If so, the rest is about one of those.
     pub critical: bool,
-    /// What the rest is about: [`COLLISION`], or the requirement that was breached. One that recurs comes before others, a
-    /// collision before a breach, and a hard one before a light one.
+    /// The subject of the other fields: [`COLLISION`], or the requirement that was breached. A finding that recurs comes
+    /// before others, a collision before a breach, and a hard finding before a light one.
     pub finding: String,
     /// How often it recurs, if that was tried.
     pub recurrence: Option<Recurrence>,
-    /// What a collision means for people, in the words of `oracle::Harm`; `None` of a breach.
+    /// The harm of a collision to people, in the words of `oracle::Harm`; `None` for a breach.
     pub harm: Option<String>,
     /// As `oracle::Severity::harm_share`; 0 of a breach.
     pub harm_share: f64,
@@ -46,7 +46,7 @@ impl FoundIn {
 
     /// The surest and worst first.
     fn order(&self, other: &FoundIn) -> Ordering {
-        // What was not tried is not known to be a matter of chance.
+        // A finding that was not tried is not known to be a matter of chance.
         let key = |of: &FoundIn| {
             (!of.critical, !of.recurrence.is_none_or(Recurrence::recurs), of.finding != COLLISION)
         };
@@ -63,7 +63,7 @@ pub struct Near {
     pub collision: Option<Uncounted>,
     /// The requirement that came nearest to a breach there, with its margin and its unit; `None` if nothing was near.
     pub requirement: Option<(String, f64, String)>,
-    /// The shortest time to a collision with somebody ahead, at the speeds of the moment, s.
+    /// The shortest time to a collision with a road user ahead, at the speeds of the moment, s.
     pub ttc_s: Option<f64>,
 }
 
@@ -167,7 +167,7 @@ impl Database {
                 harm_share: row.get(6)?,
             })
         })?;
-        // Of an episode with several findings the first in that order stands for it.
+        // The first finding in that order stands for an episode with several.
         found.sort_by(FoundIn::order);
         let mut seen = BTreeSet::new();
         found.retain(|one| seen.insert(one.episode));

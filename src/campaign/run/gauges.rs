@@ -1,4 +1,4 @@
-//! What is measured tick by tick while an episode is played: danger (criticality, post-encroachment time), and how the
+//! The measurements of every tick while an episode is played: danger (criticality, post-encroachment time), and how the
 //! ego vehicle kept to limit and lane.
 
 use crate::episode::EpisodeLog;

@@ -1,6 +1,6 @@
 //! Groups of similar failures: what a run found, by what happened and not by how often.
 //!
-//! Two counted collisions are alike if they are of one pre-crash type (`episode::PreCrash`) and the same modules are at
+//! Two counted collisions are similar if they are of one pre-crash type (`episode::PreCrash`) and the same modules are at
 //! fault, if these were looked for. Angles, bodies and sides are details of the example.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,7 +12,7 @@ use crate::oracle::Recurrence;
 use crate::run::database::{Database, from_columns};
 use crate::run::sealed::{DatabaseError, query_all};
 
-/// Counted collisions that are alike.
+/// Similar counted collisions.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Group {
     /// The pre-crash type, and its number among NHTSA's 37; a wreck has none.
@@ -27,11 +27,11 @@ pub struct Group {
     /// The group's example: one that recurs, if there is any, or else one that was tried; of these the episode with the
     /// shortest scenario, the first among equals.
     pub episode: i64,
-    /// Of the example.
+    /// The recurrence of the example.
     pub recurrence: Option<Recurrence>,
     pub road: String,
-    /// Of the example: what was hit (`pedestrian`, `animal`, `object`, `two-wheeler`, `car` or `large vehicle`), and its verb, for example
-    /// `CrossRoad`.
+    /// The obstacle of the example (`pedestrian`, `animal`, `object`, `two-wheeler`, `car` or `large vehicle`), and its
+    /// verb, for example `CrossRoad`.
     pub kind: String,
     pub manoeuvre: String,
     /// How the obstacle moved, in the words of `oracle::Severity`, and where the ego vehicle was hit.
@@ -95,8 +95,8 @@ impl Database {
         Ok(groups)
     }
 
-    /// The episodes to be played again next: of each group, and of each requirement, of which nothing recurs so far, the
-    /// untried one with the shortest scenario or the worst breach. Only what has a scenario can be played.
+    /// The episodes to be played again next, from each group and each requirement of which nothing recurs so far: the
+    /// untried episode with the shortest scenario or the worst breach. Only an episode with a scenario can be played.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -129,7 +129,7 @@ impl Group {
     }
 }
 
-/// What [`kind`] calls a pedestrian.
+/// The word of [`kind`] for a pedestrian.
 pub(crate) const PEDESTRIAN: &str = "pedestrian";
 
 /// The kind of an obstacle by the name of its body.

@@ -1,9 +1,10 @@
 //! A run: many episodes of one space over seeds and roads, judged, counted and kept.
-//! [`Run`] is made from [`RunSettings`] and knows how to set up, play and judge its nth episode; [`play`] does so for
+//!
+//! [`Run`] is made from [`RunSettings`] and knows how to set up, play and judge its nth episode. [`play`] does so for
 //! many, on threads. Its episodes share an [`Arena`]: space, roads, driving system, rules in force. Each gives an
-//! [`EpisodeSummary`] (its collisions with their verdicts), which [`Database`] keeps in `run.db` and reads back as
-//! totals and as groups of similar failures. [`Stage`] plays one emitted scenario again, and [`Stepped`] is an episode
-//! that another program steps through.
+//! [`EpisodeSummary`]: its collisions with their verdicts. [`Database`] keeps the summaries in `run.db` and reads them back
+//! as totals and as groups of similar failures. [`Stage`] plays one emitted scenario again. [`Stepped`] is an episode that
+//! another program steps through.
 
 mod arena;
 mod columns;

@@ -1,4 +1,4 @@
-//! What became of each row: in how many steps it was legal when the agent asked for it, and what stood in its way in the others.
+//! The outcomes of each row: in how many steps it was legal when the agent asked for it, and the reasons for refusals.
 //! An episode notes the offers of every step ([`Offered`]), `run.db` adds the episodes up, and [`RowCount`] is the sum
 //! for one row. From these a run says at its end which rows never happened.
 
@@ -53,7 +53,7 @@ impl Offered {
     }
 }
 
-/// What became of a row in all episodes of a run.
+/// The outcomes of a row in all episodes of a run.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct RowCount {
     /// Steps in which the agent asked for it, and it was legal.
@@ -62,7 +62,7 @@ pub struct RowCount {
     pub chosen: i64,
     /// Steps in which it was carried out.
     pub realised: i64,
-    /// What stood in its way in the other steps in which the agent asked for it, the most frequent first.
+    /// The reasons that refused it in the other steps in which the agent asked for it, the most frequent first.
     pub refused: Vec<RefusalCount>,
 }
 

@@ -52,7 +52,7 @@ pub struct TrafficRecord {
 }
 
 impl TrafficRecord {
-    /// What a run records of a traffic profile: nothing of the default.
+    /// A run's record of a traffic profile: `None` for the default.
     pub fn new(traffic: &TrafficProfile) -> Option<TrafficRecord> {
         let is_default = *traffic == TrafficProfile::default();
         (!is_default).then(|| TrafficRecord { digest: traffic.digest(), settings: *traffic })
@@ -101,7 +101,7 @@ pub fn recorded_traffic(scenario: &Scenario) -> Result<TrafficProfile, RunError>
 /// one is started once, to see that it can be and is still the same, unless it is only known from its record.
 ///
 /// # Errors
-/// If there is none of that name, it has no settings, or they mean something else in this version; if an external one
+/// If there is none of that name, it has no settings, or they mean something else in this version. If an external system
 /// cannot be started, or has another name, version or kind of answer.
 pub(super) fn under_test(
     ads: &str,
@@ -159,7 +159,7 @@ pub fn recorded(scenario: &Scenario) -> Result<Selected, RunError> {
     selected(&scenario.name, ads, origin.profile.as_deref(), origin.profile_digest.as_deref())
 }
 
-/// What the driving system is called that a scenario was found with; of an external one its name without the version, which
+/// The name of the driving system with which a scenario was found; for an external one its name without the version, which
 /// is meant to change.
 pub fn found_with(scenario: &Scenario) -> String {
     let ads = scenario.origin.ads.as_deref().unwrap_or(DEFAULT_ADS);
@@ -176,7 +176,7 @@ fn attached(scenario: &Scenario) -> Result<Attached, RunError> {
     Attached::from_line(line).map_err(|reason| RunError::Attached { name: scenario.name.clone(), reason })
 }
 
-/// What a command line says of the driving system to play scenarios with.
+/// The driving system for playing scenarios, as a command line states it.
 #[derive(Debug, Default, Clone)]
 pub struct Asked {
     pub ads: Option<String>,

@@ -1,4 +1,4 @@
-//! What came of each action that was carried out, with its values: the table of a protocol, and heat maps by two parameters.
+//! The outcome of each executed action, with its values: the table of a protocol, and heat maps by two parameters.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -91,7 +91,7 @@ pub struct ProtocolTest {
 }
 
 impl ProtocolTest {
-    /// What was lost of the speed before the contact, m/s.
+    /// The reduction of the speed before the contact, m/s.
     pub fn reduction_mps(&self) -> Option<f64> {
         Some((self.before_mps? - self.impact_mps?).max(0.0))
     }
@@ -163,10 +163,10 @@ impl Database {
             let breaches = of_episode(&breaches, episode, |breach| breach.0);
             let mut begun: Vec<usize> = (0..steps.len()).filter(|at| steps[*at].action.is_some()).collect();
             let offered = of_episode(&offered, episode, |offer| offer.0);
-            // Of what is played in such an episode its own row alone is noted as offered.
+            // Such an episode notes only its own row as offered, whatever else it plays.
             let own = offered.first().and_then(|(_, row)| usize::try_from(*row).ok());
             let asked = protocol.and_then(|space| space.rows.get(own?));
-            // The rows before the one that was asked for make somebody appear.
+            // The rows before the one that was asked for make road users appear.
             begun.retain(|at| asked.is_none_or(|row| steps[*at].row == i64::try_from(row.index).ok()));
             let of_asked = |reason: &&(i64, i64, String)| {
                 asked.is_none_or(|row| i64::try_from(row.index) == Ok(reason.1))
@@ -189,7 +189,7 @@ impl Database {
                 tests.push(test);
             }
             for (nth, at) in begun.iter().enumerate() {
-                // What comes until the next action is put down to this one.
+                // All steps until the next action are put down to this one.
                 let until = begun.get(nth + 1).copied().unwrap_or(steps.len());
                 // The encroachment is the episode's: it belongs to its only action, if there is one.
                 let pet_s = pet_s.filter(|_| begun.len() == 1);
@@ -426,7 +426,7 @@ fn heat_map(
     Some(HeatMap { action, down, across, rows: rows.labels, columns: columns.labels, cells })
 }
 
-/// What stands for the action among parameters; none is called so, since it is a keyword.
+/// The word for the action among parameters; no parameter has this name, since it is a keyword.
 const ACTION: &str = "action";
 
 /// A map of each action by the two of its parameters that have the most values, and one of all those without such parameters; by road

@@ -1,4 +1,4 @@
-//! What `run.db` and `study.db` have in common: layout, settings, and seals, by which a resumed run sees that nothing
+//! The common parts of `run.db` and `study.db`: layout, settings, and seals, by which a resumed run sees that nothing
 //! was changed behind its back.
 //!
 //! The settings stand in the database as they were when it was begun. Every episode (or cell) has a seal: a digest of
@@ -101,7 +101,7 @@ impl From<rusqlite::Error> for DatabaseError {
     }
 }
 
-/// What a layout's number is of: each kind of database counts in a thousand of its own.
+/// The kind of database that a layout's number belongs to: each kind has a separate thousand of numbers.
 fn kind(version: i64) -> Option<&'static str> {
     match version {
         1..1000 => Some("a run or a training"),
@@ -111,12 +111,12 @@ fn kind(version: i64) -> Option<&'static str> {
     }
 }
 
-/// What is done with a file that has nothing in it.
+/// The treatment of a file that has nothing in it.
 #[derive(Clone, Copy)]
 pub(super) enum IfEmpty {
     /// Its tables are made.
     Begin,
-    /// It is refused: whatever only reads writes nothing.
+    /// It is refused: a caller that only reads writes nothing.
     Refuse,
 }
 
@@ -131,7 +131,7 @@ pub struct Layout {
     pub unit: &'static str,
     /// The tables with its rows.
     pub tables: &'static [&'static str],
-    /// A table whose rows name rows of another by a column with that one's name. What they name is sealed with them.
+    /// A table whose rows name rows of another by a column with that one's name. The named rows are sealed with them.
     pub naming: Option<(&'static str, &'static str)>,
     /// The tables whose rows depend on where the directory is.
     pub local: &'static [&'static str],
@@ -366,8 +366,8 @@ pub(super) fn open_file(path: &Path, flags: OpenFlags) -> Result<Connection, Dat
 /// The path of a database as SQLite is to be given it.
 ///
 /// # Errors
-/// If it, or what SQLite would read or write beside it, is no file of its own: SQLite follows links and waits for pipes. If it is
-/// in the journal mode WAL.
+/// If the file or its journal is no regular file: SQLite follows links and waits for pipes. If the journal has further
+/// names. If the file is in the journal mode WAL.
 pub(super) fn path_of(path: &Path) -> Result<PathBuf, DatabaseError> {
     let beside = |ending: &str| {
         let mut name = path.as_os_str().to_owned();
@@ -387,7 +387,7 @@ pub(super) fn path_of(path: &Path) -> Result<PathBuf, DatabaseError> {
     Ok(Path::new(".").join(path))
 }
 
-/// What every file of SQLite begins with.
+/// The first bytes of every file of SQLite.
 const MAGIC: &[u8] = b"SQLite format 3\0";
 
 /// Refuses a file in the journal mode WAL. In that mode, whoever opens the file writes into `FILE-shm`, which may be a further name
@@ -401,10 +401,10 @@ fn check_journal(path: &Path) -> Result<(), DatabaseError> {
     }
 }
 
-/// What a file declares: the name and the kind of each table and index, the table that it belongs to, and its text.
+/// The declarations of a file: the name and the kind of each table and index, the table that it belongs to, and its text.
 type Declared = Vec<(String, String, String, Option<String>)>;
 
-/// What an attached file declares, sorted.
+/// The declarations of an attached file, sorted.
 pub(super) fn declared(connection: &Connection, file: &str) -> Result<Declared, DatabaseError> {
     let query = format!("SELECT name, type, tbl_name, sql FROM {file}.sqlite_schema ORDER BY 1, 2, 3, 4");
     query_all(connection, &query, |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?)))
@@ -537,7 +537,7 @@ fn fields_that_differ(
     keys.sort();
     keys.dedup();
     keys.retain(|key| begun.get(*key) != now.get(*key));
-    // What a digest is of says more than the digest.
+    // The values that a digest covers say more than the digest.
     if keys.len() > 1 {
         keys.retain(|key| *key != "digest");
     }

@@ -1,4 +1,4 @@
-//! What a run is asked to do, as `run.yaml` keeps it, and why it cannot begin.
+//! The settings of a run, as `run.yaml` keeps them, and why it cannot begin.
 
 use crate::oracle;
 use crate::oracle::AvoidabilitySettings;
@@ -25,15 +25,15 @@ pub struct Conditions {
     pub engine: String,
     /// Path of the space, from the directory in which this is written.
     pub space: String,
-    /// What the space meant: see `model::Meaning`.
+    /// A digest of the space's meaning: see `model::Meaning`.
     pub space_digest: String,
     pub roads: Vec<String>,
     pub ads: String,
     /// Settings of the driving system; without them it has its defaults.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<Profile>,
-    /// Who an external driving system said to be, and how it is reached and asked. Its working directory is one from
-    /// the directory in which this is written.
+    /// The identity that an external driving system stated, and how it is reached and asked. Its working directory is
+    /// relative to the directory in which this is written.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub external: Option<Attached>,
     /// Vehicles of ambient traffic.

@@ -49,7 +49,7 @@ pub trait Units: Sized {
         Self::LAYOUT.tables.contains(&"scenario")
     }
 
-    /// What a message calls a unit.
+    /// The name of a unit in a message.
     fn called(number: i64) -> String {
         format!("{} {number}", Self::LAYOUT.unit)
     }
@@ -181,7 +181,7 @@ impl Layout {
         let taken = declared(connection, "main")
             .and_then(|wanted| check_declared(connection, "other", &wanted))
             .and_then(|()| self.take_attached(connection, units, adjust));
-        // Without a transaction under way, detaching cannot fail for a reason of its own.
+        // Without a transaction under way, detaching fails only if something before it failed.
         let detached = connection.execute_batch("DETACH DATABASE other");
         taken?;
         Ok(detached?)

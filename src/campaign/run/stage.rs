@@ -80,8 +80,8 @@ impl<'a> Stage<'a> {
         (log, judgements, first)
     }
 
-    /// Plays it, and finds what it is about: the first of the counted collisions and breaches that the file claims and that
-    /// happen; of a file that claims none, the first counted collision.
+    /// Plays it, and finds its subject: the first of the counted collisions and breaches that the file claims and that
+    /// happen. If the file claims none, the first counted collision.
     pub fn first_found(&self, ads: &Selected) -> (EpisodeLog, Vec<Judgement>, Option<Found>) {
         let log = self.play(ads, &mut |_, _, _| {});
         let judgements = self.judge(ads, &log);
@@ -109,7 +109,7 @@ impl<'a> Stage<'a> {
         (log, judgements, found)
     }
 
-    /// What it lacks if [`Stage::first_found`] finds nothing, in words that follow its name.
+    /// The reason why [`Stage::first_found`] finds nothing, in words that follow its name.
     pub fn lack_in_words(&self) -> &'static str {
         match self.scenario.claims_a_finding() {
             true => "has none of the collisions and breaches that it claims",

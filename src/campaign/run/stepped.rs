@@ -2,7 +2,7 @@
 //! others wrote.
 //! If the rows of an episode of `avastra run` are chosen again here under the same seed, the bytes are the same. This
 //! does not hold for agents that also choose the values of a row (`space-filling` and the searches), nor for policies
-//! with an observation period of their own.
+//! with a different observation period.
 
 use ndarray::Array1;
 
@@ -50,7 +50,7 @@ impl Stepped {
         self.play.setup().seed
     }
 
-    /// What an agent sees now.
+    /// An agent's observation now.
     pub fn observation(&self) -> &Observation {
         &self.observation
     }

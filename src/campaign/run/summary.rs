@@ -16,7 +16,7 @@ pub struct EpisodeSummary {
     /// Number of the episode in its run, from 0.
     pub episode: usize,
     pub collisions: Vec<Finding>,
-    /// The requirements that were breached, and who would have kept them; empty if that was not asked.
+    /// The requirements that were breached, and the drivers that would have kept them; empty if that was not asked.
     pub breached: Vec<Breached>,
     /// Measures of danger for each step; empty if the episode was not measured.
     pub criticality: Vec<Criticality>,
@@ -47,7 +47,7 @@ pub struct Finding {
     pub recurrence: Option<Recurrence>,
     /// Whether it is proved that no step before it can be left out.
     pub minimal: bool,
-    /// What the author calls the obstacle, if it is a body of the author's own.
+    /// The author's name of the obstacle, if its body is one that the author defined.
     pub own_body: Option<String>,
 }
 
@@ -106,8 +106,8 @@ impl EpisodeSummary {
         }
     }
 
-    /// What its scenario is about: the first counted collision, because a crash is more than a breach that led to it, or
-    /// else the first breach.
+    /// The subject of its scenario: the first counted collision, because a crash is more than a breach that led to it.
+    /// Without a counted collision, the first breach.
     pub fn first_found(&self, log: &EpisodeLog) -> Option<Found> {
         let counted = self.collisions.iter().find(|finding| finding.counted);
         let breach = (!log.breaches.is_empty()).then_some(Found::Breach(0));
@@ -121,8 +121,8 @@ impl EpisodeSummary {
         of_collisions.max(log.breaches.iter().map(|breach| breach.step).max())
     }
 
-    /// Plays the scenario of the log so many times more, to say of every counted collision and of every requirement that was
-    /// breached how often it happens again. Says nothing if the driving system cannot be asked.
+    /// Plays the scenario of the log `replays` times more, to find how often every counted collision and a breach of every
+    /// breached requirement happens again. Says nothing if the driving system cannot be asked.
     pub fn find_recurrence(&mut self, setup: &Setup, script: &Script, log: &EpisodeLog, replays: u32) {
         if replays == 0 || self.last_step(log).is_none() || !can_replay(&setup.ads) {
             return;

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::thread::Builder;
 
-/// Runs `work` for each item, on at most `threads` threads. What `work` reports by `tell` is handed to `on` on the
+/// Runs `work` for each item, on at most `threads` threads. Reports of `work` by `tell` are handed to `on` on the
 /// calling thread, in the order of arrival. Stops early, between items, when `stop` is set or `on` fails; `tell`
 /// returns false then.
 ///

@@ -10,7 +10,7 @@ use crate::study::results::{estimate, values};
 /// From this p-value on, two agents are not told apart.
 pub const P_MAX: f64 = 0.05;
 
-/// What a study says to a table of published figures.
+/// The comparison of a study with a table of published figures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreement {
     /// Each figure that our study has a number for, in the order of the study's agents and roads.
@@ -38,7 +38,7 @@ pub struct ComparedPair {
     pub verdict: Verdict,
 }
 
-/// What our figures say to an order.
+/// The verdict of our figures on an order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     Same,

@@ -1,4 +1,4 @@
-//! What a study file says, field by field. Unknown fields are refused.
+//! The content of a study file, field by field. Unknown fields are refused.
 
 use std::collections::BTreeMap;
 
@@ -28,7 +28,7 @@ pub struct StudyFile {
     pub ambient: u32,
     /// How other vehicles drive: the name of a traffic profile, or a file; without it as they usually do.
     pub traffic: Option<String>,
-    /// All seeds of trainings and evaluations are derived from this one, each kind by a stream of its own.
+    /// All seeds of trainings and evaluations are derived from this one, each kind by a separate stream.
     #[serde(default = "default_seed")]
     pub first_seed: u64,
     #[serde(default)]
@@ -44,7 +44,7 @@ pub struct StudyFile {
     /// Published figures that the result is held against by `avastra study results`.
     #[serde(default)]
     pub published: Vec<PublishedTable>,
-    /// What the result means, and why it differs from what is published; printed by `avastra study results`.
+    /// The meaning of the result, and why it differs from published figures; printed by `avastra study results`.
     pub remarks: Option<String>,
 }
 

@@ -21,7 +21,7 @@ pub struct Job {
     pub number: u32,
 }
 
-/// What happens while jobs are played.
+/// An event while jobs are played.
 pub enum Event {
     /// An episode is over; the number of its counted collisions.
     Episode { counted: usize },
@@ -58,7 +58,7 @@ pub fn play_jobs<E>(
     on_threads(jobs, threads, stop, work, on)
 }
 
-/// What a training made, as the study judges it.
+/// The agent that a training made, as the study judges it.
 fn actor(training: &Training, settings: &AgentSettings) -> Box<dyn Agent> {
     let shuffled = settings.training.as_ref().is_some_and(|plan| plan.shuffled_states);
     let shuffled = shuffled.then(|| training.agent().shuffled().expect("only networks are shuffled"));

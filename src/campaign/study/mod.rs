@@ -1,11 +1,11 @@
 //! Studies: agents compared over roads and independent repetitions, with statistics.
-//! A [`StudyFile`] says in short what to compare. [`StudySettings`] say the same in full, and [`Study`] cuts them into
-//! jobs: one training and its evaluation, or one repetition of an agent that has nothing to learn. Jobs know nothing of
-//! each other, so the result depends neither on how many run at a time nor on interruptions. [`play_jobs`] plays them
-//! on threads, and each road of a job becomes a [`CellRecord`] in [`StudyDatabase`]. [`StudyResults`] are computed from
-//! the cells alone: a number for each cell and measure (`measures`), then [`statistics`] over them. [`Played`] is kept
-//! beside the study's file: these numbers as text, from which the statistics follow again. [`Agreement`] compares them
-//! with published figures.
+//!
+//! A [`StudyFile`] says in short what to compare. [`StudySettings`] say the same in full. [`Study`] cuts them into jobs: one
+//! training and its evaluation, or one repetition of an agent that has nothing to learn. Jobs know nothing of each other.
+//! So the result depends neither on how many run at a time nor on interruptions. [`play_jobs`] plays them on threads. Each
+//! road of a job becomes a [`CellRecord`] in [`StudyDatabase`]. [`StudyResults`] are computed from the cells alone: a number
+//! for each cell and measure (`measures`), then [`statistics`] over them. [`Played`] is kept beside the study's file: these
+//! numbers as text, from which the statistics follow again. [`Agreement`] compares them with published figures.
 //!
 //! [`statistics`]: avastra_base::statistics
 //!

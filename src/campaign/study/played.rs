@@ -70,8 +70,8 @@ fn unsealed(text: &str) -> Result<&str, String> {
     }
 }
 
-/// Reads the first line. An agent that was played may be gone since: what it found stays, and of its settings, which nothing
-/// can read any more, only the episodes.
+/// Reads the first line. An agent that was played may be gone since. Its findings stay. Nothing can read its settings any
+/// more; only their episodes stay.
 fn read_head(line: &str) -> Result<Head, serde_json::Error> {
     let mut head: serde_json::Value = serde_json::from_str(line)?;
     let agents = head.pointer_mut("/settings/agents").and_then(serde_json::Value::as_array_mut);
@@ -85,7 +85,7 @@ fn read_head(line: &str) -> Result<Head, serde_json::Error> {
 }
 
 impl Played {
-    /// What is kept of a study's cells, in the order of agents, roads and numbers.
+    /// The kept figures of a study's cells, in the order of agents, roads and numbers.
     pub fn new(settings: StudySettings, cells: &[CellRecord], commit: Option<String>) -> Played {
         let mut cells: Vec<MeasuredCell> =
             cells.iter().map(|cell| MeasuredCell::new(cell, &settings.evaluation)).collect();
@@ -196,7 +196,7 @@ impl Played {
         if roads.len() < all.len() {
             found.push(format!("on {} of {} roads", roads.len(), all.len()));
         }
-        // What agents have in common is said once.
+        // Facts that agents have in common are said once.
         let mut alike: BTreeMap<String, Vec<&str>> = BTreeMap::new();
         for agent in &wanted.agents {
             let Some(own) = self.agent(&agent.label) else { continue };

@@ -1,4 +1,4 @@
-//! What is kept of a job: every evaluated episode with its collisions, and the learning curve.
+//! The record of a job: every evaluated episode with its collisions, and the learning curve.
 
 use crate::episode::EpisodeLog;
 use crate::oracle;
@@ -76,13 +76,13 @@ pub struct CollisionRecord {
     pub sudden: bool,
     pub struck: bool,
     pub avoidability: String,
-    /// Who had priority: `ego`, `other` or `none`.
+    /// The road user that had priority: `ego`, `other` or `none`.
     pub priority: String,
     pub failure: FailureClass,
 }
 
-/// What two collisions must have in common to be alike: as in the groups of a run (see `run::groups`), but without
-/// the shape of the ego vehicle's way.
+/// The features that similar collisions have in common: as in the groups of a run (see `run::groups`), but without the
+/// shape of the ego vehicle's way.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 pub struct FailureClass {
     /// `pedestrian`, `car` or `large vehicle`.

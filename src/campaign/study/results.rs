@@ -1,4 +1,4 @@
-//! What a study found: measures with intervals, comparisons with tests.
+//! The results of a study: measures with intervals, comparisons with tests.
 //!
 //! Computed from the cells alone. While some are missing, the result covers those that are there, and says so.
 
@@ -74,7 +74,7 @@ pub struct Together {
 
 /// Rates over all episodes together. Their intervals assume independent events. Collisions of one episode or of one
 /// trained policy are not quite independent, so these intervals are somewhat too short. The intervals of
-/// [`AgentResults::measures`] are sound: there each value comes from a training of its own.
+/// [`AgentResults::measures`] are sound: there each value comes from a separate training.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Pooled {
     pub episodes: usize,
@@ -187,7 +187,7 @@ impl StudyResults {
     }
 }
 
-/// What the measures of a study's cells say about one road.
+/// The results of a study's cells on one road.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredRoad {
     pub road: String,
@@ -267,8 +267,8 @@ fn agent_results(measured: MeasuredAgent, cells: &[&CellRecord]) -> AgentResults
 }
 
 /// A measure's mean over cells. No measure is below 0, so the interval is cut off there. If all cells are 0, Student's
-/// interval has no spread; a count then gets the interval of Poisson's distribution, which assumes that collisions are
-/// independent and trainings alike.
+/// interval has no spread. A count then gets the interval of Poisson's distribution, which assumes that collisions are
+/// independent and trainings identical.
 pub(super) fn estimate(measure: &str, cells: &[&MeasuredCell]) -> Option<Estimate> {
     let found = mean(&values(measure, cells))?;
     let is_count = MEASURES.iter().any(|one| one.name == measure && one.is_count);

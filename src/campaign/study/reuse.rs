@@ -47,7 +47,7 @@ impl StudySettings {
             evaluation,
             causes,
             avoidability,
-            // What an agent meets is compared with the agent; the rest is no part of a cell.
+            // `is_same` compares agents, with their profiles and rules; the rest is no part of a cell.
             question: _,
             quick: _,
             agents: _,

@@ -34,7 +34,7 @@ pub fn distill(arena: &Arena, policy: &QPolicy, seed: u64) -> Vec<PolicyRule> {
     found
 }
 
-/// What rules achieve when they drive, and how often they choose as the network. `test` is the number of episodes
+/// The figures of rules when they drive, and how often they choose as the network. `test` is the number of episodes
 /// on each road, and their seed.
 pub fn judge_rules(
     arena: &Arena,

@@ -1,4 +1,4 @@
-//! What an agent achieves when it does not learn, in figures that can be checked by playing again.
+//! The figures of an agent that does not learn. They can be checked by playing again.
 
 use std::collections::BTreeMap;
 

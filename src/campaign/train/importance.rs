@@ -1,4 +1,4 @@
-//! Permutation importance (Breiman, 2001; Fisher et al., 2019): how much worse a policy chooses when the values of
+//! Permutation importance (Breiman, 2001; Fisher et al., 2019) says how much worse a policy chooses when the values of
 //! one variable are shuffled among the states that it visited.
 //!
 //! A state weighs as much as its stake (see `Visit::stake`), so a choice that makes no difference counts for

@@ -1,8 +1,8 @@
 //! Training, and what was learned: episodes one after another, from each of which the agent learns.
 //!
 //! [`Training`] is the loop, made from [`TrainSettings`]; `record` keeps its episodes and checkpoints in `run.db`.
-//! What follows looks at a finished policy, in the [`training_arena`] where it was trained: [`evaluate`] gives its
-//! figures, [`distill`] turns its network into readable rules, and [`insight`] says why it chooses as it does.
+//! Three parts look at a finished policy, in the [`training_arena`] where it was trained. [`evaluate`] gives its figures,
+//! [`distill`] turns its network into readable rules, and [`insight`] says why it chooses as it does.
 
 mod distill;
 mod evaluation;

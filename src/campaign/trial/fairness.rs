@@ -1,6 +1,6 @@
 //! Whether a road user appeared fairly, judged from the outside.
 //!
-//! Written apart from the rule `no_teleport` and from `world::place`, which it tests: plain formulas that ignore
+//! Written apart from the rule `no_teleport` and from `world::place`, which it tests. The formulas are plain: they ignore
 //! the time in which a brake builds up, and so ask for a little less.
 
 use avastra_base::geometry::distance_m;
@@ -13,7 +13,7 @@ use avastra_world::sim::World;
 /// Rounding of figures, m.
 const SLACK_M: f64 = 0.1;
 
-/// What is unfair about the road user with this id, in words.
+/// The unfairness of the road user with this id, in words.
 pub(super) fn complaint(world: &World, request: &SpawnRequest, id: u32) -> Option<String> {
     let newcomer = world.obstacle(id)?;
     let overlaps = world
@@ -28,7 +28,7 @@ pub(super) fn complaint(world: &World, request: &SpawnRequest, id: u32) -> Optio
         let closing_mps = closing_mps.max(0.0);
         kinematics::stopping_m(closing_mps, CAREFUL_DELAY_S, CAREFUL_BRAKING_MPS2)
     };
-    // An oncoming vehicle passes in a lane of its own, so it needs no stopping zone.
+    // An oncoming vehicle passes in a separate lane, so it needs no stopping zone.
     let zone_m = match request.verb {
         Verb::DriveAhead => stopping_m(ego_mps - along_mps.max(0.0)),
         Verb::WalkAhead | Verb::WalkOpposite => stopping_m(ego_mps - along_mps),

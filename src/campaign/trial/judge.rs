@@ -3,7 +3,7 @@
 //! Inside junctions lanes lie over each other, so directions are judged on streets alone.
 //!
 //! All geometry is taken from the map and the outlines, none from the drivers' plans. A vehicle that
-//! does its verb stays on lanes of its own direction throughout; beyond that:
+//! does its verb stays throughout on lanes that run its way; beyond that:
 //!
 //! | verb | realised if |
 //! |---|---|
@@ -16,16 +16,16 @@
 //! | walk ahead, walk opposite | it appears beside the route where it was asked to, and walks along it that way |
 //! | stand | it stands on the route's path, or beside it where it was asked to |
 //!
-//! It crashes into no road user but the ego vehicle. One that is told to be at a place `early` is there within 0.5 s of that
-//! moment, if the ego vehicle keeps its speed until then.
+//! It crashes into no road user but the ego vehicle. A road user that is told to be at a place `early` is there within 0.5 s
+//! of that moment, if the ego vehicle keeps its speed until then.
 //!
-//! Somebody who is ordered gets to the speed, the lane and the place that it was told, or does all phases of its manoeuvre.
+//! An ordered road user reaches the speed, the lane and the place that it was told, or does all phases of its manoeuvre.
 //!
-//! A vehicle with a manoeuvre does all of its phases; where these lead it is theirs to say. Without one,
+//! A vehicle with a manoeuvre does all of its phases; these say where it drives. Without a manoeuvre,
 //! a vehicle that is to keep its lane does not change it; a vehicle that is to change it does so once.
-//! An overtaker in the ego vehicle's own lane changes it once to get past, and comes back: it must if it is
-//! to change, and may when it is well ahead otherwise. Changes inside junctions, where lanes lie over each other, are
-//! not counted.
+//! An overtaker in the ego vehicle's own lane changes it once to get past, and comes back. It must come back if it is to
+//! change, and may when it is well ahead otherwise. Changes inside junctions, where lanes lie over each other, are not
+//! counted.
 
 use avastra_base::geometry::wrap_angle;
 use avastra_lang::model::vocabulary::{LaneChoice, Side, Then, Verb};
@@ -125,7 +125,7 @@ pub(super) fn verdict(
         appears(scene, request, seen)?;
         return does_phases(seen);
     }
-    // Who was told to be beside the middle of its lane may be beside the road, or on the other side of it.
+    // A road user with a lateral offset in its lane may be beside the road, or on the other side of it.
     let told_aside = request.offset_m() != 0.0;
     let drives = || match told_aside {
         true => Ok(()),
@@ -200,7 +200,7 @@ pub(super) fn verdict(
     }
 }
 
-/// Every vehicle drives in lanes of its own direction: not beside the road, not on a median.
+/// Every vehicle drives in lanes that run its way: not beside the road, not on a median.
 fn stays_on_road(scene: &Scene, frame: &Frame) -> Result<(), String> {
     let Some((lane, beyond_m)) = frame.lane else {
         return Err(format!("it drives beside the road after {:.1} s", frame.after_s));
@@ -209,7 +209,7 @@ fn stays_on_road(scene: &Scene, frame: &Frame) -> Result<(), String> {
         return Err(format!("it drives {beyond_m:.1} m beside its lane after {:.1} s", frame.after_s));
     }
     let lane = scene.map.lane(lane);
-    // A turn across a junction may leave the surface of its own lane there and be over another's alone.
+    // A turning vehicle may leave the surface of its lane in a junction and be over another lane alone.
     if lane.junction.is_some() {
         return Ok(());
     }

@@ -1,4 +1,4 @@
-//! What is seen of a road user after an action made it appear: its frames, ten a second.
+//! The sighting of a road user after an action made it appear: its frames, ten a second.
 
 use avastra_base::geometry::{OrientedBox, Vec2};
 use avastra_drivers::Ads;

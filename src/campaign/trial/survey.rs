@@ -2,8 +2,8 @@
 //! On each road some drives go by without an action. At each of their steps every row is offered, as to an agent; this
 //! counts how often the row is legal, and which reasons refuse it otherwise. From some of the legal moments, spread
 //! over all of them, the row is carried out and what happens is judged. So a row on a road is realised, or not realised
-//! (with the reason), or masked (with the reasons). A row that is legal at no moment, and is about somebody who must be
-//! there, is offered after a row that makes them appear: the first after which it is legal.
+//! (with the reason), or masked (with the reasons). A row may be legal at no moment because its road user must be there
+//! first. It is then offered after a row that makes this road user appear: the first after which it is legal.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -36,7 +36,7 @@ pub struct TrialSettings {
 /// Roads that are tried at the same time, at most. Ours: it bounds the threads.
 const ROADS_AT_ONCE: usize = 64;
 
-/// What the trials say of a row on a road.
+/// The verdict of the trials on a row on a road.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
@@ -103,7 +103,7 @@ struct Moment {
     offers: Vec<Offer>,
 }
 
-/// What came of one try.
+/// The outcome of one try.
 struct Try {
     failure: Option<String>,
     unfair: Option<String>,
@@ -317,7 +317,7 @@ fn attempt(moment: &Moment, draw: &Draw, bearers: &[String]) -> Try {
         let nearest_m = seen.frames.iter().map(|frame| frame.gap_m).fold(f64::INFINITY, f64::min);
         found.nearest_m = Some(found.nearest_m.map_or(nearest_m, |other| other.min(nearest_m)));
         let verdict = match request {
-            // What the same action orders it to do is judged by itself.
+            // Orders of the same action to it are judged separately.
             Some(request) if is_told(request) => judge::appears(&scene, request, &seen),
             Some(request) => judge::verdict(&scene, request, has_phases, &seen),
             None => judge::obeys(has_phases, &seen),

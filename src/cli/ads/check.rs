@@ -1,7 +1,7 @@
-//! `avastra ads check`: whether a driving system follows the protocol, answers alike to the like, and how fast it is.
+//! `avastra ads check`: whether a driving system follows the protocol and is deterministic, and how fast it is.
 //!
-//! It drives whole episodes with what may happen around the ego vehicle, because a driving system that answers one step
-//! well may fail at the hundredth. Whatever fails is named with its stage and what to do about it.
+//! The check drives whole episodes with other road users around the ego vehicle. A driving system that answers the first
+//! step well may fail at the hundredth. Each failure is named with its stage and what to do about it.
 
 use std::sync::Arc;
 
@@ -32,13 +32,13 @@ const BROKEN_OFF_STEPS: usize = 2;
 /// Lines of standard error that are shown.
 const STDERR_LINES: usize = 12;
 
-/// What was checked.
+/// The result of one stage.
 #[derive(Debug, Serialize)]
 struct Part {
     /// In a word: `start`, `episode`, `reset`, `process`, `orders`, `close`.
     stage: &'static str,
     passed: bool,
-    /// What was found, in words.
+    /// The finding, in words.
     found: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     failure: Option<Finding>,
@@ -87,8 +87,8 @@ pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failu
     if failed > 0 { Err(Failure::Ads { findings: failed }) } else { Ok(()) }
 }
 
-/// The paper's space, which is in the program, and the folder that it is written to: a planner may open the OpenDRIVE
-/// file of its map, so that must lie on disk as long as the planner is checked.
+/// The paper's space, which is in the program, and the folder that it is written to. A planner may open the OpenDRIVE
+/// file of its map, so the file must lie on disk as long as the planner is checked.
 fn own_space(output: &Output) -> Result<(ActionTable, Scratch), Failure> {
     let scratch = Scratch::new("ads-check")?;
     for (name, text) in SHIPPED {
@@ -104,7 +104,7 @@ struct Checks<'a> {
     seed: u64,
     parts: Vec<Part>,
     speed: Option<Speed>,
-    /// Whether it says that it answers alike to the like.
+    /// Whether the driving system says that it is deterministic.
     is_deterministic: bool,
 }
 

@@ -155,7 +155,7 @@ impl Toy<'_> {
                 line(&Answer::Error(ErrorMessage { message: "the toy cannot go on".to_owned() }))
             }
             Misbehaviour::Fickle if !self.resets.is_multiple_of(3) => right,
-            // What it answers depends on its whole life, and not on the episode alone: in each, or in every third.
+            // The answer depends on the process's whole life, not on the episode alone: in each episode, or in every third.
             Misbehaviour::Forgetful | Misbehaviour::Fickle => {
                 let accel = -0.01 * (self.steps % 97) as f64;
                 line(&Answer::Acceleration(AccelerationMessage {

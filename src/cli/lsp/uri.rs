@@ -1,7 +1,7 @@
 //! Names of files: `file://` URIs in an editor, paths here.
 //!
-//! A document that is no file (`untitled:…`) keeps its URI for a path: it can be read from the editor
-//! alone, and the paths that it uses are relative to no folder.
+//! A document that is no file (`untitled:…`) keeps its URI for a path. Only the editor can give its text,
+//! and the paths that it uses are relative to no folder.
 
 use std::path::{Path, PathBuf};
 

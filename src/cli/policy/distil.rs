@@ -73,7 +73,7 @@ pub fn with_rules(arena: &Arena, acting: &QPolicy, policy: Policy) -> Policy {
     policy
 }
 
-/// What the rules achieve, compared with the network.
+/// The performance of the rules, compared with the network.
 pub fn rules_text(lines: usize, network_return: f64, rules: &RulesClaims) -> String {
     format!(
         "its {lines} rules choose as the network in {:.1} % of {} states and lose {:.3} of Q-value in each; \

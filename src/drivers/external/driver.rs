@@ -33,10 +33,10 @@ pub struct External {
     scene: Arc<Scene>,
     seed: u64,
     map: Arc<MapLine>,
-    /// Who believes what is shown; nothing where the truth is.
+    /// The modular system whose perception the program is shown; `None` if it is shown the truth.
     observer: Option<Box<Modular>>,
     follower: Follower,
-    /// What was asked so far, the `reset` first, and what came of it.
+    /// The questions so far, the `reset` first, each with its outcome.
     exchanges: Vec<Exchange>,
     live: Live,
     /// Answers that are not yet obeyed, with the tick from which on they are.
@@ -174,7 +174,7 @@ impl External {
                 continue;
             }
             let again = self.answer(&mut session, &exchange.question, exchange.step)?;
-            // What says that it may answer otherwise is not at fault when it does.
+            // A program that says it may answer otherwise is not at fault when it does.
             if self.program.is_deterministic() && !again.means(&exchange.outcome) {
                 let stage = exchange.step.map_or("reset".to_owned(), |(seq, _)| format!("step {seq}"));
                 let text = |outcome: &Outcome| serde_json::to_string(&outcome.essence()).unwrap_or_default();
@@ -235,7 +235,7 @@ impl External {
         }
     }
 
-    /// What the driving system says of its inside.
+    /// Takes over the internal state that the driving system reports.
     fn report(&mut self, answer: &Answer) {
         self.status.planned.clear();
         let internal = answer.internal();

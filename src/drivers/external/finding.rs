@@ -1,4 +1,4 @@
-//! What goes wrong with an external driving system, each under its own name. Never a collision.
+//! The errors of external driving systems, each under its own name. Never a collision.
 
 use serde::{Deserialize, Serialize};
 
@@ -24,7 +24,7 @@ words! {
 macro_rules! problems {
     ($($problem:ident = $name:tt: $kind:ident, $advice:literal;)+) => {
         words! {
-            /// What exactly is wrong.
+            /// The exact error.
             pub enum Problem { $($problem = $name,)+ }
         }
 
@@ -33,7 +33,7 @@ macro_rules! problems {
                 match self { $(Problem::$problem => FailureKind::$kind,)+ }
             }
 
-            /// What the author of the driving system can do about it.
+            /// Advice to the author of the driving system.
             pub fn advice(self) -> &'static str {
                 match self { $(Problem::$problem => $advice,)+ }
             }
@@ -80,7 +80,7 @@ pub struct Failure {
     pub problem: Problem,
     /// When: `start`, `init`, `map`, `reset`, `step 37`, `close`.
     pub stage: String,
-    /// What happened, in words.
+    /// The event in words.
     pub detail: String,
     /// How the process ended, if it had ended by itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -106,7 +106,7 @@ impl Failure {
         format!("{} ({}) at {stage}: {}", self.kind().name(), self.problem.name(), self.what())
     }
 
-    /// What happened, and how the process ended.
+    /// The event, and how the process ended.
     pub fn what(&self) -> String {
         let exit = self.exit.as_ref().map_or(String::new(), |exit| format!("; it ended with {exit}"));
         // It may be read from a file that another program wrote.

@@ -166,8 +166,8 @@ impl Course {
         Course { guide, points: points.collect(), helm: Helm::default() }
     }
 
-    /// The point at a time; after the last it brakes to rest, and stands. What stands is held by the brake (see
-    /// `Pedals::acceleration_mps2`).
+    /// The point at a time; after the last it brakes to rest, and stands. The brake holds a standing vehicle
+    /// (see `Pedals::acceleration_mps2`).
     fn at(&self, time_s: f64) -> Point {
         let (last_s, last) = self.points[self.points.len() - 1];
         let beyond_s = time_s - last_s;
@@ -267,12 +267,12 @@ mod tests {
         let mut waits = Keeps::rig(100.0, Some(LaneChangeWord::Wait));
         waits.run(30.0);
         assert!(is_at(&waits, SOURCE_Y_M) && waits.speed_mps() < 0.1, "{:?}", waits.place());
-        // Whoever is there: the other one is beside it all the time.
+        // The vehicle changes lanes whatever is there: the other one is beside it all the time.
         let mut goes = Keeps::rig(300.0, Some(LaneChangeWord::Go));
         goes.sensed.objects = vec![object(1, Body::Sedan, Pose::new(0.0, TARGET_Y_M, 0.0), 8.0)];
         goes.run(15.0);
         assert!(is_at(&goes, TARGET_Y_M), "{:?}", goes.place());
-        // Without anybody it takes the time that it indicates.
+        // Without other road users the change takes the time that it indicates.
         let mut free = Keeps::rig(300.0, None);
         free.run(0.9);
         let begins_m = free.place().y;

@@ -1,9 +1,9 @@
-//! One connection to a driving system: a process of its own group with three pipes, or a socket.
+//! One connection to a driving system: a process in a separate group with three pipes, or a socket.
 //!
-//! All reading and writing is non-blocking, in one place and on the caller's thread, so a question costs two
-//! switches between processes and no thread can be left behind. Lines and standard error are bounded, whatever comes.
-//! This is the one file of the layer that asks the clock: for time limits, which decide nothing but that an answer is
-//! missing, and for how long an answer took; what follows from a missing answer is in the log.
+//! All reading and writing is non-blocking, in one place and on the caller's thread, so a question costs two switches
+//! between processes and no thread can be left behind. Lines and standard error are bounded, whatever comes. This is
+//! the one file of the layer that asks the clock: for time limits, which decide nothing but that an answer is
+//! missing, and for how long an answer took. The log has the consequences of a missing answer.
 
 use std::collections::BTreeSet;
 use std::io::{ErrorKind, Read, Write};
@@ -100,10 +100,10 @@ enum Ends {
 /// A connection to a driving system.
 pub struct Link {
     ends: Ends,
-    /// What is still to be written.
+    /// Bytes to be written.
     to_write: Vec<u8>,
     written: usize,
-    /// What was read and not yet taken.
+    /// Bytes that were read and not yet taken.
     read: Vec<u8>,
     /// Up to here `read` has no end of a line.
     searched: usize,
@@ -175,7 +175,7 @@ impl Link {
     /// Writes as much as fits now; the rest goes with the next line that is waited for.
     pub fn send(&mut self, line: &str) {
         self.to_write.extend_from_slice(line.as_bytes());
-        // What cannot be written is noticed when an answer is waited for.
+        // A failed write is noticed when an answer is waited for.
         let _ = self.write();
     }
 
@@ -202,7 +202,8 @@ impl Link {
                 return Err(Broken { problem: Problem::NoAnswer, detail: "no answer in time".to_owned() });
             }
             if !self.wait(left) && self.exit_within(0.0).is_some() {
-                // Something that it started may hold its output open. What it wrote before it ended is read by now.
+                // Something that it started may hold its output open. All that the process wrote before it ended is
+                // read by now.
                 self.is_orphaned = true;
             }
         }
@@ -366,7 +367,7 @@ impl Link {
     /// How it ended, if not by itself with status 0. A socket always ends well.
     pub fn close(&mut self, line: &str, limit_s: f64) -> Result<(), String> {
         self.send(line);
-        // What the pipe does not hold is lost; the end of the input says the same.
+        // Bytes that the pipe does not hold are lost; the end of the input says the same.
         match &mut self.ends {
             Ends::Process { stdin, .. } => *stdin = None,
             Ends::Tcp(socket) => drop(socket.shutdown(std::net::Shutdown::Both)),

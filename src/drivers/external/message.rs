@@ -659,7 +659,7 @@ mod tests {
         }
     }
 
-    /// Numbers alike, whether written as integers or not.
+    /// The same value for a number whether it is written as an integer or not.
     fn alike(a: &Value, b: &Value) -> bool {
         match (a, b) {
             (Value::Number(a), Value::Number(b)) => a.as_f64() == b.as_f64(),

@@ -60,7 +60,7 @@ struct Known {
 pub(super) struct MapLine {
     map: Arc<RoadMap>,
     pub line: String,
-    /// What every conversation on the map begins with.
+    /// The key that every conversation on the map begins with.
     pub key: Key,
 }
 
@@ -208,7 +208,7 @@ impl Program {
         self.may_start
     }
 
-    /// Who it is, as far as it was asked, and how.
+    /// The program's identity, as far as it was asked for, and its settings.
     pub fn attached(&self) -> Attached {
         let identity = self.identity.get().cloned();
         Attached { identity, settings: self.settings.clone(), is_recorded: false }
@@ -318,7 +318,7 @@ impl Drop for Program {
     }
 }
 
-/// What is behind the lock is whole, even if a thread panicked while it held it.
+/// The data behind the lock are whole, even if a thread panicked while it held the lock.
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

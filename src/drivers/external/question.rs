@@ -1,4 +1,4 @@
-//! What a driving system is told: the map, the beginning of an episode, and each step.
+//! The messages to a driving system: the map, the beginning of an episode, and each step.
 
 use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! The answers of an episode, and their file: `NAME.answers.jsonl` beside a scenario.
 //!
 //! A question is known by a digest of the conversation up to it, so an answer is found again only where everything
-//! before was the same. What was asked is not kept: it follows from the episode.
+//! before was the same. The questions are not kept: they follow from the episode.
 
 use std::sync::Arc;
 
@@ -62,7 +62,7 @@ impl Key {
     }
 }
 
-/// What came of a question.
+/// The outcome of a question.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
@@ -100,7 +100,7 @@ impl Outcome {
         self.essence() == other.essence()
     }
 
-    /// What digests cover.
+    /// The part of the outcome that digests cover.
     pub fn essence(&self) -> Outcome {
         match self {
             Outcome::Answer(answer) => {
@@ -119,10 +119,10 @@ impl Outcome {
     }
 }
 
-/// What identifies an external driving system and how it was asked; scenarios have it in one line.
+/// The identity of an external driving system and the settings it was asked with; scenarios have both in one line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Attached {
-    /// Who it said to be; nothing if it never came so far.
+    /// The identity that the program gave; `None` if it never came so far.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub identity: Option<Identity>,
     pub settings: ExternalSettings,
@@ -146,7 +146,7 @@ impl Attached {
     }
 
     /// # Errors
-    /// What is wrong with the line.
+    /// The mistake in the line.
     pub fn from_line(line: &str) -> Result<Attached, String> {
         let attached: Attached = serde_json::from_str(line).map_err(|error| error.to_string())?;
         let settings = attached.settings.checked().map_err(|error| error.to_string())?;

@@ -18,7 +18,7 @@ const LATE_MAX: u32 = 3;
 /// A trajectory reaches at least this far beyond its step, µs.
 const REACH_US_MIN: u64 = 1_000_000;
 
-/// What a driving system says of itself.
+/// The facts that a driving system states about itself.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Identity {
     pub name: String,
@@ -59,7 +59,7 @@ impl Session {
     /// Starts a driving system, or connects to one, and asks it who it is.
     ///
     /// # Errors
-    /// What went wrong, and its standard error.
+    /// The failure, and the program's standard error.
     pub fn open(settings: &ExternalSettings, init: &Init) -> Result<Session, Failure> {
         let deadline = Deadline::after(settings.timeouts.init_s);
         let mut link =
@@ -97,7 +97,7 @@ impl Session {
     /// Asks by a line that `ready` answers.
     ///
     /// # Errors
-    /// What went wrong; the driving system is of no use then.
+    /// The failure, after which the driving system is of no use.
     pub fn ready(&mut self, line: &str, stage: &'static str, limit_s: f64) -> Result<(), Failure> {
         if stage == "reset" {
             self.link.begin_episode();
@@ -113,7 +113,7 @@ impl Session {
     /// finding.
     ///
     /// # Errors
-    /// What else went wrong; the driving system is of no use then.
+    /// Any other failure, after which the driving system is of no use.
     pub fn step(
         &mut self,
         line: &str,
@@ -271,7 +271,7 @@ pub(super) fn read(line: &[u8], wanted: &str) -> Result<Answer, Broken> {
             let message = error.message.chars().take(ERROR_CHARS_MAX).collect();
             Err(Broken { problem: Problem::Reported, detail: message })
         }
-        // What comes in place of `ready` may be a second answer to a step, or a late one: the caller tells by `seq`.
+        // An answer in place of `ready` may be a second answer to a step, or a late one: the caller tells by `seq`.
         _ if wanted != "ready" && word != wanted => Err(wrong_type(line, wanted)),
         answer => Ok(answer),
     }
@@ -292,7 +292,7 @@ fn outside_strings(text: &str, word: &str) -> bool {
     false
 }
 
-/// Who a driving system is, by its first `ready`.
+/// The identity of a driving system, by its first `ready`.
 fn identity(ready: Ready, init: &Init) -> Result<Identity, Broken> {
     if let Some(broken) = ready.out_of_range("") {
         return Err(broken);

@@ -14,7 +14,7 @@ use super::message::{AnswerKind, Observation};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExternalSettings {
-    /// What is started or connected to.
+    /// The program to start, or the address to connect to.
     pub command: Target,
     /// Where a program is started; where avastra runs if not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -43,7 +43,7 @@ fn usual_period() -> f64 {
     FRAME_S
 }
 
-/// What a missed step means.
+/// The effect of a missed step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum OnTimeout {
@@ -123,7 +123,7 @@ impl Target {
     /// From a command line: words are parted at blanks, quotes hold them together; or `tcp:HOST:PORT`, `unix:PATH`.
     ///
     /// # Errors
-    /// What is wrong with it, in words.
+    /// The mistake, in words.
     pub fn from_text(text: &str) -> Result<Target, String> {
         if let Some(address) = text.strip_prefix("tcp:") {
             let has_port = address.rsplit_once(':').is_some_and(|(host, port)| {
@@ -232,7 +232,7 @@ impl ExternalSettings {
     /// directory is one of `folder`, where the profile lies.
     ///
     /// # Errors
-    /// What is wrong with the block, or with the text as YAML.
+    /// The mistake in the block, or in the text as YAML.
     pub fn from_yaml(text: &str, folder: &Path) -> Option<Result<ExternalSettings, ExternalError>> {
         let mistake = |error| ExternalError::Yaml(yaml_mistake(&error, text));
         let whole: serde_json::Value = match serde_yaml::from_str(text) {

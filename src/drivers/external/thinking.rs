@@ -17,7 +17,7 @@ const LEAST_S: f64 = 1e-6;
 /// How much longer the times of a bucket are than those of the one before.
 const GROWTH: f64 = 1.05;
 
-/// What is told of them.
+/// The reported figures of the answer times.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Thinking {
     /// Answers to steps that a process gave, since avastra was started.

@@ -2,7 +2,7 @@
 //! the route changes to.
 //!
 //! The frame is a guide along the lane that the vehicle is in. While a lane change of the route is due, its
-//! target is one more goal to sample; the vehicle is in the target lane once its middle has crossed the line,
+//! target is one more goal to sample. The vehicle is in the target lane once its middle has crossed the line,
 //! and the frame changes with it. Until then another goal may win, and the change is broken off.
 
 use std::sync::Arc;

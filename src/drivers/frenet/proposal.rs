@@ -1,15 +1,15 @@
 //! Proposals and their scores.
 //!
 //! A proposal is a lateral curve, driven at one of five parts of the limit (PDM-Closed: Dauner, Hallgarten,
-//! Geiger, Chitta 2023). Its speed follows a quartic to that part (Werling: velocity keeping); behind what is
-//! ahead, the interaction term of the intelligent driver model is taken off it, so a proposal is rolled out
+//! Geiger, Chitta 2023). Its speed follows a quartic to that part (Werling: velocity keeping). Behind a
+//! leader, the interaction term of the intelligent driver model is taken off it, so a proposal is rolled out
 //! against the forecasts of others. Werling's quintics for following and stopping are left out: PDM-Closed
 //! takes a red light as something that stands there, and so does this.
 //!
 //! The score is that of nuPlan's closed loop as PDM-Closed uses it: no collision at fault, times the weighted
 //! mean of progress, time to collision and comfort. Its other factors, drivable area and driving direction,
 //! hold by construction: `lateral` samples no offset outside the lanes of the own direction. Werling's costs
-//! decide between proposals that score alike.
+//! decide between proposals with the same score.
 
 use crate::kit::{BESIDE_M, FOLLOWED_MPS, Guide, HARDEST_MPS2, Point, Stop, speed_mps2};
 use crate::status::Reason;
@@ -52,7 +52,7 @@ const COMFORT_MPS3: f64 = 4.13;
 const COST_JERK: f64 = 0.05;
 const COST_TIME: f64 = 0.3;
 const COST_DEVIATION: f64 = 1.0;
-/// What a unit of Werling's cost is worth in points of the score. Ours: less than any metric.
+/// Points of the score per unit of Werling's cost. Ours: less than any metric.
 const SCORE_PER_COST: f64 = 0.02;
 
 /// The situation in which proposals are rolled out.
@@ -71,7 +71,7 @@ pub struct Outlook<'a> {
 pub struct Proposal {
     pub lateral: Lateral,
     pub points: [Point; STEPS + 1],
-    /// What holds it back most in its first second.
+    /// The reason that limits its speed most in its first second.
     pub reason: Reason,
     /// The first step with a collision at fault, and the id of the road user.
     pub collision: Option<(usize, u32)>,

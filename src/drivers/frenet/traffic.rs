@@ -24,7 +24,7 @@ const SIDE_M: f64 = 7.0;
 const BEHIND_M: f64 = 60.0;
 /// A vehicle turned farther than this from its lane is not following it, rad. Ours.
 const OFF_LANE_RAD: f64 = 0.5;
-/// Nor is one that moves sideways faster, m/s: drivers wander at up to 0.3. Ours.
+/// A vehicle with a higher lateral speed is not following its lane either, m/s: drivers wander at up to 0.3. Ours.
 const SIDEWAYS_MPS: f64 = 0.4;
 /// A lane this near to the middle of a vehicle may be its own, m.
 const LANE_REACH_M: f64 = 0.5;

@@ -1,4 +1,4 @@
-//! The corridor that the vehicle needs, and who is in it or in the same strip of a lane beside it.
+//! The corridor that the vehicle needs, and the road users in it or in the same strip of a lane beside it.
 
 use avastra_base::geometry::{Beside, Span, unit_vector};
 use avastra_world::sim::{SensedObject, VehicleParameters};
@@ -15,8 +15,8 @@ pub const BESIDE_M: f64 = 1.0;
 /// The reason for keeping away from a slower road user ahead is called a stop, not following, m/s. Ours.
 pub const FOLLOWED_MPS: f64 = 0.5;
 
-/// What a road user takes of the corridor in the lane `lateral_m` to the left of a guide: the stations, and the road
-/// user's speed along them, m/s. `front_m` is the station of the vehicle's front.
+/// The stations that a road user takes of the corridor in the lane `lateral_m` to the left of a guide, and its speed
+/// along them, m/s. `front_m` is the station of the vehicle's front.
 pub fn in_lane(guide: &Guide, object: &SensedObject, lateral_m: f64, front_m: f64) -> Option<(Span, f64)> {
     let rear_m = front_m - VehicleParameters::MKZ.length_m;
     let at = guide.project(object.pose.position, rear_m - guide.range_m(), front_m + guide.range_m());

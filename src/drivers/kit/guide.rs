@@ -38,7 +38,7 @@ const STRAIGHT_M: f64 = 1e-3;
 /// Step of the differences that give the slope of a guide beside the path, m.
 const H_M: f64 = 0.25;
 
-/// What bounds the speed on a free road.
+/// The limits of speed on a free road.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpeedRules {
     /// Speed on a free road, m/s.
@@ -50,9 +50,9 @@ pub struct SpeedRules {
 }
 
 impl SpeedRules {
-    /// How our drivers drive in towns, all alike, so that they can be compared. The speed is that of Apollo's upstream
-    /// `planning.conf`, `default_cruise_speed` (25 mph), the curves are its speed bounds' `max_centric_acceleration_limit`;
-    /// the slowing down is ours.
+    /// How our drivers drive in towns: all in the same way, so that they can be compared. The speed is that of Apollo's
+    /// upstream `planning.conf`, `default_cruise_speed` (25 mph), the curves are its speed bounds'
+    /// `max_centric_acceleration_limit`; the slowing down is ours.
     pub const TOWN: SpeedRules =
         SpeedRules { cruise_mps: 11.18, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
 
@@ -119,8 +119,8 @@ impl Guide {
         Guide::beside(scene, rules, |_| 0.0)
     }
 
-    /// As [`Guide::new`], but each lane change begins at a station of its own (m); it does not begin at
-    /// all while that is infinite. Stations remain those of the route's path.
+    /// As [`Guide::new`], but each lane change has its own station (m) at which it begins; it does not begin
+    /// at all while that is infinite. Stations remain those of the route's path.
     pub fn with_changes(scene: &Scene, rules: &SpeedRules, begins_m: &[f64]) -> Guide {
         debug_assert_eq!(begins_m.len(), scene.route.changes.len());
         let changes = || scene.route.changes.iter().zip(begins_m);

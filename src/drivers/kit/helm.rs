@@ -6,7 +6,7 @@ use avastra_world::sim::{Control, DT_S, EgoMotion, FRAME_TICKS};
 
 use super::guide::Guide;
 
-/// What a driver keeps from tick to tick.
+/// The state that a driver keeps from tick to tick.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Helm {
     ticks: u64,

@@ -1,4 +1,4 @@
-//! The driver kit: what our driving systems share, so that a new one is a file of its own ideas.
+//! The driver kit: what our driving systems share, so that the file of a new one has only its own ideas.
 //!
 //! | file | what the author of a driver gets |
 //! |---|---|
@@ -12,10 +12,10 @@
 //! | `point`, `pedals` | a point of a plan, and Apollo's cascade from it to an acceleration |
 //! | `steering` | a steering controller (LQR) along a guide or beside it |
 //!
-//! Laws that the world shares, such as the driver model of others (`Following`) and stopping distances, are `kinematics`';
-//! the outline of a box along a way is `geometry::extent_m`; pedals for an acceleration are `sim::Control::towards`.
-//! A driver of its own is these, its law, and one line in `ads::REGISTRY`. Constants here are those on which our
-//! drivers agree, so that they can be compared; those in which they differ stand with each driver.
+//! Laws that the world shares, such as the driver model of others (`Following`) and stopping distances, are in
+//! `kinematics`. The outline of a box along a way is `geometry::extent_m`. Pedals for an acceleration are
+//! `sim::Control::towards`. A new driver is these, its law, and one line in `ads::REGISTRY`. Constants here are those
+//! on which our drivers agree, so that they can be compared; those in which they differ stand with each driver.
 
 mod corridor;
 mod guide;

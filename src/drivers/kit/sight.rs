@@ -9,14 +9,14 @@ const PEDESTRIAN_M: f64 = 60.0;
 /// An object is not seen if less than this share of it is in sight. Ours, as in `scenarios/ads/default.yaml`.
 const VISIBLE_FRACTION_MIN: f64 = 0.2;
 
-/// What a driver has seen.
+/// The objects that a driver has seen.
 #[derive(Debug, Clone, Default)]
 pub struct Sight {
     /// How far vehicles are seen, m: as far as anything is sensed.
     vehicle_m: f64,
     /// Factor of the range for pedestrians in full darkness, in `[0, 1]`.
     night_factor: f64,
-    /// What was in sight at the last two looks, the newer last.
+    /// The objects in sight at the last two looks, the newer last.
     looks: [Vec<SensedObject>; 2],
     known: Vec<SensedObject>,
 }
@@ -27,9 +27,9 @@ impl Sight {
         Sight { vehicle_m: scene.range_m, night_factor, ..Sight::default() }
     }
 
-    /// Looks once; to be called every frame. What the driver knows then is the look of the frame before
-    /// (0.1 s), carried on at constant velocity. An object is known after two looks
-    /// in a row, as trackers confirm what they see.
+    /// Looks once; to be called every frame. The driver then knows the look of the frame before (0.1 s),
+    /// carried on at constant velocity. An object is known after two looks in a row, as trackers confirm what
+    /// they see.
     pub fn look(&mut self, sensed: &Sensed) {
         let [older, newer] = &mut self.looks;
         let confirmed = |object: &&SensedObject| older.iter().any(|before| before.id == object.id);
@@ -48,7 +48,7 @@ impl Sight {
         newer.extend(sensed.objects.iter().filter(in_sight));
     }
 
-    /// What the driver knows: each object as it should be now. Its distance is that of the look.
+    /// The objects that the driver knows, each as it should be now. Its distance is that of the look.
     pub fn known(&self) -> &[SensedObject] {
         &self.known
     }

@@ -79,8 +79,8 @@ impl Emergency {
         }
         let speed_mps = motion.speed_mps;
         let braking = self.braking_mps2 > 0.0;
-        // What has begun is carried through to rest, unless the way becomes free: the slower the vehicle, the
-        // later it would get there, and that is no reason to let go.
+        // Emergency braking is carried through to rest, unless the way becomes free. The slower the vehicle,
+        // the later it would get there, and that is no reason to let go.
         let judged_mps = if braking { speed_mps.max(self.config.speed_mps_min) } else { speed_mps };
         let found = tracks
             .iter()

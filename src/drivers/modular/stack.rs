@@ -118,7 +118,7 @@ impl Modular {
     /// Writes perceptions and plan into the status; its buffers are reused.
     fn report(&mut self) {
         let forecasts = self.prediction.forecasts();
-        // Of the hypotheses of one object only the most probable is reported; it comes first.
+        // Only the most probable hypothesis of an object is reported; it comes first.
         let first = |index: &usize| *index == 0 || forecasts[index - 1].id != forecasts[*index].id;
         let reported = || (0..forecasts.len()).filter(first).map(move |index| &forecasts[index]);
         self.status.perceive(reported().map(|forecast| PerceivedObject {

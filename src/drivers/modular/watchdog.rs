@@ -2,7 +2,7 @@
 //!
 //! Apollo's control gives up a pose that is older than 0.2 s or a trajectory that is older than 2 s, and
 //! brakes at 50 %; a limit for perception is ours. The vehicle drives on as soon as the module is back. Left
-//! out: a hang has no cause of its own, it is planted; and no module is restarted or replaced.
+//! out: a hang has no cause but is planted, and no module is restarted or replaced.
 
 use avastra_world::sim::{Control, DT_S};
 

@@ -26,7 +26,7 @@ pub struct Reactive {
     free_s: f64,
     sight: Sight,
     signs: Signs,
-    /// What it reacts to, of the last look.
+    /// The targets of the last look that it reacts to.
     targets: Vec<Target>,
     stop: Option<Stop>,
     pedals: Pedals,

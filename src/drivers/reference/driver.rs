@@ -1,8 +1,8 @@
 //! A reference driver: a published model of careful braking in a car that follows its route.
 //!
-//! The route, its lights and ordinary traffic are the business of [`Idm`], which sees here with the
-//! model's own reaction time (what was seen, carried on at constant speed) and brakes for others no
-//! harder than is comfortable. Whatever is harder is the model's reaction to a risk.
+//! The route, its lights and ordinary traffic are the business of [`Idm`], which sees here with the model's
+//! own reaction time (what was seen, carried on at constant speed) and brakes for others no harder than is
+//! comfortable. Whatever is harder is the model's reaction to a risk.
 //!
 //! A reference driver is the judge's careful driver: what is in its line of sight, and near enough for
 //! the fog, it knows as it truly is. Darkness and rain do not blind it, it ignores traffic behind it, and
@@ -51,19 +51,19 @@ pub struct Reference<M> {
     route: Idm,
     model: M,
     reflex: Reflex,
-    /// What the model demands since the last look, m/s², and the id of the object that is the reason.
+    /// The deceleration that the model demands since the last look, m/s², and the id of the object that is the reason.
     demand: Option<(f64, u32)>,
-    /// What was in sight at the last looks, the newest last.
+    /// The objects in sight at the last looks, the newest last.
     looks: VecDeque<Vec<SensedObject>>,
-    /// What the route's driver is shown; kept for its buffers.
+    /// The scene that the route's driver is shown; kept for its buffers.
     shown: Option<Sensed>,
     /// The encounters of the last look by object.
     watched: BTreeMap<u32, Encounter>,
     helm: Helm,
-    /// What the model gave in the last tick, m/s².
+    /// The deceleration that the model gave in the last tick, m/s².
     braking_mps2: f64,
-    /// Whether it looks aside before a lane change. What it sees a reaction time late is enough to drive by, but not where
-    /// it has just taken over, has seen nothing yet, and would change lanes blindly.
+    /// Whether it looks aside before a lane change. A view that is a reaction time late is enough to drive by. It is not
+    /// enough where the driver has just taken over, has seen nothing yet, and would change lanes blindly.
     looks_aside: bool,
 }
 

@@ -43,8 +43,8 @@ pub struct Encounter {
 }
 
 impl Encounter {
-    /// How a road user seen now stands to an ego vehicle whose front is at `front_m` of the route.
-    /// `None` if the ego vehicle is past it. What needs earlier looks (`other_mps2`, `aside_m`) is left at 0.
+    /// How a road user seen now stands to an ego vehicle whose front is at `front_m` of the route. `None` if
+    /// the ego vehicle is past it. Values that need earlier looks (`other_mps2`, `aside_m`) are left at 0.
     pub(super) fn seen(
         guide: &Guide,
         object: &SensedObject,

@@ -52,7 +52,7 @@ impl Evasion {
         })
     }
 
-    /// What it does, in words.
+    /// The evasion in words.
     pub fn describe(&self) -> String {
         let pedal = match self.pedal {
             Pedal::FullBrake => "full brake".to_owned(),

@@ -1,12 +1,13 @@
 //! The intelligent driver model (Treiber, Hennecke, Helbing 2000) on the route, with true knowledge.
 //!
-//! It sees everything within 120 m, hidden or not, looking around ten times a second. Around the
-//! model stand rules of our own: it stops at red and yellow lights where it can and at stop signs, brakes for
-//! what is on its way, and gives way to what would cross its way at nearly the same time, unless it has priority
-//! and the other is not seen to take it (`giving_way`). Predictions are straight lines at constant speed.
+//! It sees everything within 120 m, hidden or not, looking around ten times a second. Around the model stand
+//! rules of our own. It stops at red and yellow lights where it can, and at stop signs. It brakes for road users
+//! and objects on its way. It gives way to a road user that would cross its way at nearly the same time, unless
+//! it has priority and the other is not seen to take it (`giving_way`). Predictions are straight lines at
+//! constant speed.
 //!
-//! It begins a lane change of the route once no vehicle in the target lane would have to brake hard for
-//! it, nor it for them (the safety criterion of MOBIL: Kesting, Treiber, Helbing 2007); until then it
+//! It begins a lane change of the route once no vehicle in the target lane would have to brake hard for it,
+//! nor it for them. This is the safety criterion of MOBIL (Kesting, Treiber, Helbing 2007). Until then it
 //! stays in its lane and stops where a short change is just possible.
 
 use std::sync::Arc;
@@ -50,7 +51,7 @@ pub struct Idm {
     is_beset: bool,
     steering: Arc<Steering>,
     helm: Helm,
-    /// What it keeps away from, looked for every fifth tick.
+    /// The obstacles that it keeps away from, looked for every fifth tick.
     ahead: Vec<Ahead>,
     signs: Signs,
     status: Status,
@@ -189,7 +190,7 @@ impl Idm {
         })
     }
 
-    /// What a road user means for the ego vehicle: a leader, something in the way, or something that crosses it.
+    /// The role of a road user for the ego vehicle: a leader, an obstacle in the way, or a crossing road user.
     fn ahead(
         &self,
         sensed: &Sensed,
@@ -284,8 +285,8 @@ impl Idm {
     }
 
     /// Learns from the vehicle's place which lane changes of the route are begun or over, before its first look. A driver
-    /// that does not drive from the start, but goes on where another one was, would otherwise take itself to be in the
-    /// source lane: it would steer back to it, and what stands ahead of it would stand beside its way.
+    /// that goes on where another one was would otherwise take itself to be in the source lane. It would steer back to
+    /// that lane, and an object ahead of it would count as beside its way.
     pub(super) fn find_place(&mut self, rear_axle: &Pose) {
         while let Some(change) = self.changes.next() {
             let beside = self.guide().locate(rear_axle.position, None);

@@ -1,4 +1,4 @@
-//! What lies between a perceived risk and the brake: evaluation, reaction, build-up, release.
+//! The phases between a perceived risk and the brake: evaluation, reaction, build-up, release.
 //!
 //! The times and slopes are those of the models; that a driver who has just braked stays alert and
 //! does not react anew is ours. In the code that the models were published with, a driver never speeds up

@@ -6,7 +6,7 @@ use super::r157::{CarefulHuman, FuzzySafety, MinimalPerformance};
 use super::reflex::{Braking, Reflex};
 use super::rss::Rss;
 
-/// Cars of the grid, m; the gap across between two in the middle of lanes of 3.5 m; a look, s.
+/// Length of the cars of the grid, m. Lateral gap between two in the middle of lanes of 3.5 m. Time between looks, s.
 const LENGTH_M: f64 = 5.0;
 const SIDE_GAP_M: f64 = 1.6;
 const LOOK_S: f64 = 0.1;

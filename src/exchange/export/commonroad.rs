@@ -1,9 +1,9 @@
 //! A recording as a CommonRoad scenario (XML 2020a, TUM): lanelets, traffic lights, everyone's trajectory, and a planning
 //! problem, so that planners of that world can be tried on a crash.
 //!
-//! A time step is 0.1 s. Numbers: lanelet `n` is the nth lane of the map; of the road user that claims call `npc#N`, the
-//! number ends in N (`10002` is `npc#2`), and with N = 0 it is the ego vehicle, if that is asked for. The planning
-//! problem is to be on the route at the end of the recording without a contact: the goal of the episode is mostly farther away.
+//! A time step is 0.1 s. Numbers: lanelet `n` is the nth lane of the map. The number of the road user that claims call
+//! `npc#N` ends in N (`10002` is `npc#2`). With N = 0 it is the ego vehicle, if that is asked for. The planning problem
+//! is to be on the route at the end of the recording without a contact. The goal of the episode is mostly farther away.
 //!
 //! Two departures. The schema wants every obstacle to be there at step 0; one that appears later begins later here, which
 //! `commonroad-io` reads and writes too. Lights repeat what was recorded, not their whole cycle.

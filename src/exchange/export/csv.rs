@@ -8,13 +8,18 @@ use avastra_world::sim::DT_S;
 use super::recording::Recording;
 use super::xml::number;
 
-/// Columns: `time_s`; `id` (0 is the ego vehicle, others as claims number them); `body`; `x_m`, `y_m` of the middle of the
-/// outline, in the plane of the map; `heading_rad`; `vx_mps`, `vy_mps` in the same plane; `length_m`, `width_m`,
-/// `height_m`; `contact`: 1 at the end of the tick in which it began to touch another one, the ego vehicle or not; `like`: the body of the
-/// engine that `body` is, or that a body of the author's own is like; `name`: the one that it bears, if it bears one; `along_m`,
-/// `left_m`: where its middle is along the ego vehicle's route, and to the left of that; `lights` that a vehicle was told to show;
-/// `contact_with`: the numbers of those that it began to touch, with spaces between them.
-/// By rising time, then in order of appearance.
+/// One line per road user and time, by rising time, then in order of appearance. Columns:
+///
+/// - `time_s`; `id`: 0 is the ego vehicle, others as claims number them; `body`.
+/// - `x_m`, `y_m`: the middle of the outline in the plane of the map; `heading_rad`.
+/// - `vx_mps`, `vy_mps` in the same plane.
+/// - `length_m`, `width_m`, `height_m`.
+/// - `contact`: 1 at the end of the tick in which it began to touch another road user or the ego vehicle.
+/// - `like`: the body of the engine that `body` is, or that a body of the author's is like.
+/// - `name`: its name, if it has one.
+/// - `along_m`, `left_m`: its middle along the ego vehicle's route, and to the left of the route.
+/// - `lights` that a vehicle was told to show.
+/// - `contact_with`: the numbers of those that it began to touch, with spaces between them.
 pub fn csv(recording: &Recording) -> String {
     let mut text = "time_s,id,body,x_m,y_m,heading_rad,vx_mps,vy_mps,length_m,width_m,height_m,contact,like,\
          name,along_m,left_m,lights,contact_with\n"

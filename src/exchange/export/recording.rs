@@ -1,4 +1,4 @@
-//! What the replay of an emitted scenario looked like, and what its file says of it.
+//! The replay of an emitted scenario, with the documentation and the claims of its file.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -24,7 +24,7 @@ pub const SCENARIO_TEXT_LACKS: &str = "scenario_text_lacks";
 #[derive(Debug, Clone)]
 pub struct Recording {
     pub name: String,
-    /// What the scenario's file says of it, line by line.
+    /// The documentation of the scenario's file, line by line.
     pub docs: Vec<String>,
     pub map: Arc<RoadMap>,
     /// The OpenDRIVE file.
@@ -36,7 +36,7 @@ pub struct Recording {
     pub seen: Recorder,
     /// The road in its space, with its trajectories.
     pub road: Road,
-    /// What those were told who appear at the start.
+    /// The road users that appear at the start, as they were told.
     pub told: Vec<Told>,
     /// Names of the author's own bodies, by number of the road user.
     pub own_bodies: BTreeMap<u32, String>,
@@ -48,7 +48,7 @@ pub struct Recording {
     pub refused: Vec<String>,
 }
 
-/// What a road user was told that appears at the start, and is told nothing later.
+/// The spawn of a road user that appears at the start and gets no orders later.
 #[derive(Debug, Clone)]
 pub struct Told {
     /// As claims number it.
@@ -80,9 +80,9 @@ impl Recording {
     }
 }
 
-/// Plays a scenario again and writes down what happens. What it claims about the drive itself (collisions, end, digest of
-/// all ticks) must hold; verdicts about collisions are handed on as they are written. What is not legal in it is said in
-/// [`Recording::refused`].
+/// Plays a scenario again and writes down what happens. Its claims about the drive itself (collisions, end, digest of all
+/// ticks) must hold; verdicts about collisions are handed on as they are written. Actions that are not legal in it are
+/// listed in [`Recording::refused`].
 ///
 /// # Errors
 /// If it cannot be played, or plays otherwise than it claims.
@@ -132,7 +132,7 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
     })
 }
 
-/// What those were told who appear at once in the first step, and are told nothing later.
+/// The spawns of road users that appear at once in the first step and get no orders later.
 fn told(log: &EpisodeLog, facts: &BTreeMap<u32, NpcFacts>) -> Vec<Told> {
     let Some(Outcome::Done { draw, spawned, delay_ticks: 0, .. }) =
         log.steps.first().map(|step| &step.outcome)
@@ -148,7 +148,7 @@ fn told(log: &EpisodeLog, facts: &BTreeMap<u32, NpcFacts>) -> Vec<Told> {
         let is_ordered =
             |effect: &Effect| matches!(effect, Effect::Order(order) if Some(order.bearer) == request.bearer);
         let is_free = !later.chain(&draw.effects).any(is_ordered);
-        // What hides it has an id, too.
+        // The road user or object that hides it has an id, too.
         for _ in 1..effect.newcomers() {
             ids.next();
         }

@@ -103,7 +103,7 @@ struct Actions<'a> {
     bodies: BTreeMap<usize, &'a BodyDef>,
     /// The trajectories that they follow, likewise.
     trajectories: BTreeMap<usize, &'a TrajectoryDef>,
-    /// Whether somebody begins elsewhere in the text: beside the ego vehicle, or behind others at a junction.
+    /// Whether a road user begins elsewhere in the text: beside the ego vehicle, or behind others at a junction.
     is_moved: bool,
 }
 
@@ -187,7 +187,7 @@ impl<'a> Actions<'a> {
         }
         fields.extend(request.told.written(&space.bearers));
         fields.push(format!("colour: {}", request.colour.name()));
-        // Nor how far behind the first of a row somebody comes to a junction.
+        // The text does not say either how far behind the first of a row a road user comes to a junction.
         self.is_moved |= request.behind_first_m != 0.0;
         let distance = decimal(distance_m, false);
         format!("spawn {body}{name} {place} {distance} m{cover} {{ {} }}", fields.join(", "))

@@ -61,7 +61,7 @@ impl Element {
         self.attributes.iter().find(|(known, _)| *known == name).map(|(_, value)| value.as_str())
     }
 
-    /// What it holds, in the order of the document.
+    /// Its child elements, in the order of the document.
     pub fn children(&self) -> &[Element] {
         &self.children
     }

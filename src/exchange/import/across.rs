@@ -1,4 +1,4 @@
-//! Places across the road: other lanes, offsets in them, and how fast somebody moves there.
+//! Places across the road: other lanes, offsets in them, and the speed of lateral moves.
 
 use avastra_base::geometry::{SMOOTH_STEP_SLOPE_MAX, wrap_angle};
 use avastra_lang::model::OFFSET_M;
@@ -11,10 +11,10 @@ use super::phases::{Told, instead_of};
 use super::said::Said;
 use super::source::{Mark, Source};
 
-/// The fastest that somebody is told to move aside, m/s.
+/// The largest lateral speed of an order, m/s.
 const ASIDE_MPS_MAX: f64 = 10.0;
 
-/// Who moves aside faster than this part of its speed is markedly slower along its way in the file's player.
+/// Above this part of its speed, a lateral move makes a vehicle markedly slower along its way in the file's player.
 const SLOW_PART: f64 = 0.15;
 
 /// A way is looked at in such steps for the roads that it leads over, m.
@@ -23,7 +23,7 @@ const ROADS_M: f64 = 10.0;
 /// A way is looked at in such steps for lanes beside it, m.
 const LOOK_M: f64 = 0.5;
 
-/// Lanes beside somebody's own along a stretch of its way.
+/// Lanes beside a road user's lane along a stretch of its way.
 pub struct LanesBeside {
     /// Stations of its way, m.
     pub from_m: f64,
@@ -34,20 +34,21 @@ pub struct LanesBeside {
 }
 
 impl<'a> Cast<'a> {
-    /// A way to the left in the road's direction as one to the left of somebody in a lane of it, on its way.
+    /// Turns a distance to the left in the road's direction into one to the left of a road user in a lane, on its way.
     pub fn left_m(&self, moving: &Moving, told: &Told, left_m: f64) -> f64 {
         let Some(place) = told.lane else { return left_m };
         let is_along = self.map.lane(place.lane).is_along();
         if self.goes_with_lane(moving, told.at_m, place) == is_along { left_m } else { -left_m }
     }
 
-    /// Whether somebody drives in the direction of a lane that it is in.
+    /// Whether a road user drives in the direction of a lane that it is in.
     fn goes_with_lane(&self, moving: &Moving, at_m: f64, place: LanePlace) -> bool {
         let lane_rad = self.map.lane(place.lane).centre.heading_at(place.station_m);
         wrap_angle(moving.path.heading_at(at_m) - lane_rad).abs() < core::f64::consts::FRAC_PI_2
     }
 
-    /// Whether the lanes of all roads to come of somebody's way are alike in something, as far as steps of [`ROADS_M`] show.
+    /// Whether the lanes of all roads ahead on a road user's way agree in a property, as far as steps of [`ROADS_M`]
+    /// show.
     pub fn are_lanes_alike<K: PartialEq>(
         &self,
         moving: &Moving,
@@ -66,7 +67,8 @@ impl<'a> Cast<'a> {
         })
     }
 
-    /// Where on its way, across, somebody is so much to the left of another one: as both begin, and as both are then.
+    /// The lateral place on its way at which a road user is `more_m` to the left of another one: as both begin, and as
+    /// both are then.
     pub fn beside(
         &self,
         source: &mut Source,
@@ -138,8 +140,8 @@ impl<'a> Cast<'a> {
         Some(told.lane_m)
     }
 
-    /// Lanes to the left of somebody's own, where it comes to the first stretch of its way that has any of them. Lanes of the other
-    /// direction count if they are asked for.
+    /// Lanes to the left of a road user's lane, where it comes to the first stretch of its way that has any of them.
+    /// Lanes of the other direction count if they are asked for.
     pub fn lanes_beside(
         &self,
         source: &mut Source,
@@ -176,7 +178,7 @@ impl<'a> Cast<'a> {
         Some(LanesBeside { from_m, to_m, right_m, left_m })
     }
 
-    /// How far to the left of a station of somebody's way the middle of a lane lies, m.
+    /// How far to the left of a station of a road user's way the middle of a lane lies, m.
     pub fn aside_m(&self, moving: &Moving, at_m: f64, lane: LanePlace) -> f64 {
         let here = moving.path.pose_at(at_m);
         let centre = &self.map.lane(lane.lane).centre;
@@ -188,7 +190,7 @@ impl<'a> Cast<'a> {
         let (own_key, of_key) = (&self.map.lane(own.lane).key, &self.map.lane(of.lane).key);
         if own_key.road == of_key.road {
             let s_m = self.map.lane(own.lane).road_station_m(own.station_m);
-            // Numbers rise to the left of the road, which is to the right of who drives against it.
+            // Numbers rise to the left of the road, which is to the right of a vehicle that drives against it.
             let lanes = if self.map.lane(of.lane).is_along() { lanes } else { -lanes };
             let mut id = of_key.lane + lanes;
             // Lanes have no number 0.

@@ -1,4 +1,4 @@
-//! What the actions of a file ask of an entity: a place, a speed, another lane, a way.
+//! The actions of a file that an entity executes: a place, a speed, another lane, a way.
 
 use core::f64::consts::FRAC_PI_2;
 
@@ -91,7 +91,7 @@ pub enum Over {
     Time(f64),
     /// m.
     Way(f64),
-    /// Of the greatest change, m/s² of a speed, m/s of a place aside.
+    /// By the greatest rate of change: m/s² for a speed, m/s for a lateral place.
     Rate(f64),
 }
 
@@ -116,7 +116,7 @@ pub struct Kept {
     pub is_continuous: bool,
 }
 
-/// How fast somebody who comes to a distance gains speed and loses it, m/s², and is at most, m/s.
+/// The limits of an entity that comes to a distance: acceleration and deceleration, m/s², and speed, m/s.
 #[derive(Debug, Clone, Copy)]
 pub struct Bounds {
     pub gains_mps2: f64,
@@ -157,11 +157,11 @@ pub struct Way {
     pub timing: Option<(f64, f64)>,
     /// Whether the times count from the beginning of the scenario.
     pub is_absolute: bool,
-    /// Whether who follows it steers along it, and so has headings of its own.
+    /// Whether an entity that follows it steers along it, and so has its own headings.
     pub is_steered: bool,
 }
 
-/// Reads an action of somebody's within a `PrivateAction`; `None` if it does nothing that matters, or is refused.
+/// Reads an action of an entity within a `PrivateAction`; `None` if it does nothing that matters, or is refused.
 pub fn act(source: &mut Source, action: Node, name: &str, is_ego: bool) -> Option<Act> {
     let mark = source.mark(action);
     match action.tag_name().name() {
@@ -402,7 +402,7 @@ fn distance(source: &mut Source, action: Node) -> Option<ActKind> {
     Some(ActKind::Ahead(of, headway))
 }
 
-/// The bounds of how somebody comes to a distance; `None` if they bind nothing.
+/// The bounds of an entity that comes to a distance; `None` if they bind nothing.
 fn within(source: &mut Source, bounds: Node) -> Option<Option<Bounds>> {
     if bounds.has_attribute("maxAccelerationRate") || bounds.has_attribute("maxDecelerationRate") {
         source.note("how fast an acceleration changes is not bounded");

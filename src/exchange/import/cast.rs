@@ -1,4 +1,4 @@
-//! Everybody with a way, as the other parts of an import ask about them.
+//! All entities with a way, as the other parts of an import ask about them.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -25,7 +25,7 @@ const OFF_ROUTE_M: f64 = 12.0;
 /// Two ways that lie beside each other for so long are of one road, m.
 const SAME_ROAD_M: f64 = 100.0;
 
-/// A trajectory as a part of somebody's way.
+/// A trajectory as a part of an entity's way.
 #[derive(Debug)]
 pub struct Leg<'a> {
     pub way: &'a Way,
@@ -37,7 +37,7 @@ pub struct Leg<'a> {
     pub lane: Option<LanePlace>,
 }
 
-/// Somebody on a way.
+/// An entity on a way.
 pub struct Moving<'a> {
     pub entity: &'a Entity,
     pub bearer: String,
@@ -53,7 +53,7 @@ pub struct Moving<'a> {
     pub legs: Vec<Leg<'a>>,
 }
 
-/// The ego vehicle's way with everybody who has a place.
+/// The ego vehicle's way with all entities that have a place.
 pub struct Cast<'a> {
     pub story: &'a Story,
     pub map: Rc<Ground>,
@@ -110,7 +110,7 @@ impl<'a> Cast<'a> {
         self.places.borrow_mut().placed(source, position)
     }
 
-    /// Refuses a place that is relative to somebody who may be elsewhere later on.
+    /// Refuses a place that is relative to an entity that may be elsewhere later on.
     pub fn stays(&self, source: &mut Source, place: &Position) -> Option<()> {
         let Some(name) = place.relative_to() else { return Some(()) };
         let moves = match self.moving.iter().find(|moving| moving.entity.name == name) {
@@ -123,7 +123,7 @@ impl<'a> Cast<'a> {
         source.refuse_if(moves, &place.mark, reason)
     }
 
-    /// What an entity is called in a phase of the actor.
+    /// The name of an entity in a phase of the actor.
     pub fn called(&self, source: &mut Source, mark: &Mark, actor: &Moving, name: &str) -> Option<String> {
         match () {
             () if self.is_ego(name) => Some("ego".to_owned()),
@@ -132,7 +132,7 @@ impl<'a> Cast<'a> {
         }
     }
 
-    /// Where somebody begins.
+    /// Where an entity begins.
     pub fn begins(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<Vec2> {
         if self.is_ego(name) {
             return Some(self.route.path.position_at(0.0));
@@ -140,7 +140,7 @@ impl<'a> Cast<'a> {
         self.moving(source, mark, name).map(|moving| moving.placed.pose.position)
     }
 
-    /// How fast somebody is when the scenario begins, m/s.
+    /// The speed of an entity when the scenario begins, m/s.
     pub fn begins_mps(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<f64> {
         match self.is_ego(name) {
             true => speed(source, self.story, &self.story.ego, 0),
@@ -155,7 +155,7 @@ impl<'a> Cast<'a> {
         if projected.station_m > 0.0 { projected.station_m } else { begin.to_local(point).x.min(0.0) }
     }
 
-    /// Whether somebody begins on another road than the ego vehicle's route.
+    /// Whether an entity begins on another road than the ego vehicle's route.
     pub fn is_far_off(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<bool> {
         if self.is_ego(name) {
             return Some(false);
@@ -166,8 +166,8 @@ impl<'a> Cast<'a> {
         Some(is_beside && beside.offset_m.abs() > OFF_ROUTE_M)
     }
 
-    /// The way between the reference points of two is the station of `front` less that of `back` and this, m; with it by how much it is
-    /// longer than the one between their outlines. `None` if they follow different roads.
+    /// The distance between two reference points is the station of `front`, less that of `back`, plus this, m. The second
+    /// value is by how much it is longer than the distance between their outlines. `None` if they follow different roads.
     pub fn stations_apart_m(&self, back: &str, front: &str) -> Option<(f64, f64)> {
         let of = |name: &str| self.moving.iter().find(|moving| moving.entity.name == name);
         let (back, front) = (of(back)?, of(front)?);
@@ -184,7 +184,7 @@ impl<'a> Cast<'a> {
         (goes_on_m.abs() < 0.1 * SAME_ROAD_M).then_some((here_m - front.at_m, overhangs_m))
     }
 
-    /// The names of all in the file who are there, the ego vehicle first.
+    /// The names of all present entities of the file, the ego vehicle first.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         let others = self.moving.iter().map(|moving| moving.entity.name.as_str());
         core::iter::once(self.story.ego.name.as_str()).chain(others)
@@ -199,17 +199,17 @@ impl<'a> Cast<'a> {
         (width_m(&pair.of) + width_m(&pair.to)) / 2.0
     }
 
-    /// From the reference point of somebody's body in the file to its front, m.
+    /// From the reference point of an entity's body in the file to its front, m.
     pub fn front_m(&self, name: &str) -> f64 {
         self.story.entity(name).map_or(0.0, |entity| entity.body.middle_m + entity.body.length_m / 2.0)
     }
 
-    /// What of the way between the reference points of two lies in their outlines, m.
+    /// The part of the distance between two reference points that lies in the outlines, m.
     pub fn overhangs_m(&self, source: &mut Source, mark: &Mark, back: &str, front: &str) -> Option<f64> {
         Some(self.overhang_m(source, mark, front, false)? + self.overhang_m(source, mark, back, true)?)
     }
 
-    /// How far an end of somebody's outline lies beyond its reference point along the ego vehicle's route, m.
+    /// How far an end of an entity's outline lies beyond its reference point along the ego vehicle's route, m.
     fn overhang_m(&self, source: &mut Source, mark: &Mark, name: &str, is_front: bool) -> Option<f64> {
         if self.is_ego(name) {
             let rear_m = VehicleParameters::MKZ.length_m - EGO_FRONT_M;
@@ -229,7 +229,7 @@ impl<'a> Cast<'a> {
         Some(self.turned_rad(source, mark, name)?.abs() < core::f64::consts::FRAC_PI_2)
     }
 
-    /// Whether somebody begins across the ego vehicle's route, rather than along it.
+    /// Whether an entity begins across the ego vehicle's route, rather than along it.
     pub fn goes_across(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<bool> {
         if self.is_ego(name) {
             return Some(false);
@@ -253,7 +253,8 @@ impl Moving<'_> {
         Some(self.station_m(point))
     }
 
-    /// The station of somebody whose reference point in the file is there, m. On foot the language means the middle.
+    /// The station of an entity whose reference point in the file is there, m. For a pedestrian the language means the
+    /// middle.
     pub fn station_m(&self, point: Vec2) -> f64 {
         self.path.project(point).station_m + self.more_m()
     }

@@ -32,11 +32,11 @@ const DEPTH_MAX: usize = 8;
 #[derive(Debug, Clone)]
 struct Entry {
     text: Rc<str>,
-    /// What is wrong with it; empty if nothing is.
+    /// The error in it; empty if there is none.
     reason: String,
-    /// What it says that is not read.
+    /// The parts of it that are not read.
     noted: BTreeSet<String>,
-    /// What its catalogue calls itself, if only its file has the name that was asked for.
+    /// The name in its catalogue, if only its file has the name that was asked for.
     other_name: Option<String>,
 }
 

@@ -12,13 +12,14 @@ use super::source::{Mark, Source};
 use super::story::Event;
 use super::trigger::{Clearance, Condition, Edge, Pair, Trigger, When, asks_for_less};
 
-/// Who drives through a circle of a smaller radius may be through it within a tick: it is reached once its near edge is, m.
+/// An entity may drive through a circle of a smaller radius within a tick: the circle is reached once its near edge is,
+/// m.
 const PASSED_M: f64 = 1.0;
 
-/// What a distance beside the way may change of one along it, m.
+/// A lateral distance may change a distance along the way by at most this, m.
 const ASIDE_M: f64 = 0.5;
 
-/// What differs by less from a bound is just there, m.
+/// A value that differs by less from a bound is just there, m.
 const JUST_M: f64 = 1e-6;
 
 const AT_ITS_BOUND: &str = "as they begin it is just at its bound, and whether it holds cannot be told";
@@ -28,7 +29,7 @@ const AT_ITS_BOUND: &str = "as they begin it is just at its bound, and whether i
 pub struct Begins {
     /// Whether what was told before has to be done first.
     pub is_after: bool,
-    /// What must come before.
+    /// The condition that must come before.
     pub first: Option<Said>,
     pub once: Option<Said>,
     /// s.
@@ -53,7 +54,7 @@ impl Begins {
     }
 }
 
-/// Somebody who waits for a trigger.
+/// An entity that waits for a trigger.
 pub struct Waiting<'w, 'a> {
     pub cast: &'w Cast<'a>,
     pub actor: &'w Moving<'a>,
@@ -202,7 +203,7 @@ impl Waiting<'_, '_> {
                     (false, true) => return source.refuse(mark, "the two drive away from each other"),
                 };
                 let said = way.clone().and(format!(" < ({closing}) * ")).number(*seconds, "s");
-                // Who has passed the other one comes no nearer.
+                // A road user that has passed the other one comes no nearer.
                 Some(if self.is_first {
                     said
                 } else {
@@ -284,7 +285,7 @@ impl Waiting<'_, '_> {
         }
     }
 
-    /// That nobody is in lanes beside somebody.
+    /// That the lanes beside an entity are free.
     fn clear(&self, source: &mut Source, mark: &Mark, room: &Clearance) -> Option<Said> {
         let reason = "room beside somebody is read of one that drives the ego vehicle's way";
         let is_along = self.cast.looks_ahead(source, mark, &room.of)?;
@@ -319,13 +320,13 @@ impl Waiting<'_, '_> {
         })
     }
 
-    /// The lanes that somebody asks about; the inner `None` for all.
+    /// The lanes that a condition about free room means; the inner `None` for all.
     pub fn beside(&self, source: &mut Source, mark: &Mark, room: &Clearance) -> Option<Option<LanesBeside>> {
         let Some(lanes) = room.lanes else { return Some(None) };
         self.cast.lanes_beside(source, mark, &room.of, lanes, room.has_oncoming).map(Some)
     }
 
-    /// Who counts where somebody asks for room.
+    /// The road users that count for a condition about free room.
     pub fn counted(&self, source: &mut Source, mark: &Mark, room: &Clearance) -> Option<Vec<String>> {
         let ahead = self.cast.looks_ahead(source, mark, &room.of)?;
         let mut counted = Vec::new();
@@ -367,8 +368,8 @@ impl Waiting<'_, '_> {
         }
     }
 
-    /// That something of another road user's, or farther back of its own, has ended. Of a speed that is so only if the one whose
-    /// speed it is comes to it for the first time then.
+    /// That an event of another road user, or an earlier one of the actor, has ended. For a speed this can be told only
+    /// if the road user comes to that speed for the first time then.
     fn ended(&self, source: &mut Source, mark: &Mark, kind: &'static str, name: &str) -> Option<Said> {
         let Some((moving, event)) = self.cast.last_event(kind, name) else {
             let reason =
@@ -404,8 +405,8 @@ impl Waiting<'_, '_> {
         }
     }
 
-    /// That the way from somebody to another one that is ahead of it is less or more than a bound. Of one that is behind, or of who
-    /// stands, there is no headway.
+    /// That the distance from an entity to another one ahead of it is less or more than a bound. There is no headway to
+    /// an entity behind it, and none if it stands.
     fn headway(&self, source: &mut Source, mark: &Mark, pair: &Pair, of: &str, bound: &Said) -> Option<Said> {
         let (back, front) = match self.cast.looks_ahead(source, mark, &pair.of)? {
             true => (&pair.of, &pair.to),
@@ -493,13 +494,13 @@ impl Waiting<'_, '_> {
         source.refuse_if(is_just, mark, AT_ITS_BOUND)
     }
 
-    /// Refuses to ask for a place of somebody who moves aside on the way there: the place counts across, too.
+    /// Refuses a place of an entity that moves laterally on the way there: the place counts across, too.
     fn stays_beside(&self, source: &mut Source, condition: &Condition, entity: &str) -> Option<()> {
         if self.cast.is_ego(entity) {
             return Some(());
         }
         let events = &self.cast.moving(source, &condition.mark, entity)?.entity.events;
-        // What it does once it has been there does not count.
+        // Actions after it has been there do not count.
         let waits = |event: &&Event| event.when.iter().flatten().any(|own| own.mark == condition.mark);
         let before = events.iter().take_while(|event| !waits(event));
         let moves_aside = before.flat_map(|event| &event.acts).any(is_aside);
@@ -507,7 +508,7 @@ impl Waiting<'_, '_> {
         source.refuse_if(moves_aside, &condition.mark, reason)
     }
 
-    /// How far a point is beside the way of somebody, m.
+    /// The lateral distance of a point from the way of an entity, m.
     fn aside_m(&self, source: &mut Source, mark: &Mark, entity: &str, point: Vec2) -> Option<f64> {
         if self.cast.is_ego(entity) {
             return Some(self.cast.route.path.project(point).offset_m.abs());
@@ -563,13 +564,13 @@ impl Waiting<'_, '_> {
         Some((Said::text(format!("{who}.station")), station_m))
     }
 
-    /// What an entity is called in a phase of the actor.
+    /// The name of an entity in a phase of the actor.
     pub fn who(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<String> {
         self.cast.called(source, mark, self.actor, name)
     }
 }
 
-/// Whether a condition holds a time, which only a condition of its own keeps.
+/// Whether a condition has a duration, which only a separate condition keeps.
 fn needs_alone(condition: &Condition) -> bool {
     let is_time = matches!(condition.kind, When::After(_));
     condition.delay_s > 0.0 && !is_time

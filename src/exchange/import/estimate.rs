@@ -1,4 +1,4 @@
-//! What is known of a trigger from how everybody begins: whether it holds then, and about when it comes.
+//! Estimates of a trigger from how all entities begin: whether it holds then, and about when it comes.
 
 use avastra_base::geometry::Vec2;
 
@@ -80,8 +80,8 @@ impl Waiting<'_, '_> {
         })
     }
 
-    /// When a trigger comes if everybody goes on as they begin, s: never is infinity, and `None` that it is not known.
-    /// `known`: when something of the story begins or ends.
+    /// When a trigger comes if all entities go on as they begin, s. Infinity means never, and `None` that it is not
+    /// known. `known`: when something of the story begins or ends.
     pub fn comes_s(
         &self,
         source: &mut Source,
@@ -96,7 +96,7 @@ impl Waiting<'_, '_> {
                     (when @ (When::Ended { .. } | When::Begun { .. }), _) => known(when)?,
                     (When::After(seconds), Edge::None | Edge::Rising) => *seconds,
                     (_, Edge::None) => self.holds_from_s(source, condition)?,
-                    // What must first cease does so at a time that the beginning does not say.
+                    // A condition that must first cease does so at a time that the beginning does not say.
                     (_, Edge::Rising) if !self.holds(source, condition)? => {
                         self.holds_from_s(source, condition)?
                     }
@@ -185,7 +185,7 @@ impl Waiting<'_, '_> {
         })
     }
 
-    /// When somebody comes to a place, as [`Self::comes_s`].
+    /// When an entity comes to a place, as [`Self::comes_s`].
     pub fn is_at_s(&self, source: &mut Source, mark: &Mark, entity: &str, place: &PlaceMark) -> Option<f64> {
         let (way_m, mps) =
             (self.ahead_m(source, mark, entity, place)?, self.cast.begins_mps(source, mark, entity)?);
@@ -199,13 +199,13 @@ impl Waiting<'_, '_> {
         Some(if self.is_behind(source, mark, pair)? { of_mps - to_mps } else { to_mps - of_mps })
     }
 
-    /// How fast somebody begins along the ego vehicle's route, m/s; below 0 against it.
+    /// The speed of an entity along the ego vehicle's route at the beginning, m/s; below 0 against it.
     fn along_mps(&self, source: &mut Source, mark: &Mark, name: &str) -> Option<f64> {
         let mps = self.cast.begins_mps(source, mark, name)?;
         Some(if self.cast.looks_ahead(source, mark, name)? { mps } else { -mps })
     }
 
-    /// How far a place is ahead of somebody at the beginning, m.
+    /// How far a place is ahead of an entity at the beginning, m.
     fn ahead_m(&self, source: &mut Source, mark: &Mark, entity: &str, place: &PlaceMark) -> Option<f64> {
         let point = self.cast.place(source, &place.0)?.pose.position;
         let begins = self.cast.begins(source, mark, entity)?;

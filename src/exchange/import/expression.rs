@@ -8,7 +8,7 @@ const DEPTH_MAX: usize = 64;
 /// The value of what stands between `${` and `}`.
 ///
 /// # Errors
-/// What is not understood.
+/// The part that is not understood.
 pub fn value(text: &str, parameters: &BTreeMap<String, String>) -> Result<f64, String> {
     let mut reader = Reader { rest: text, parameters, depth: 0 };
     let found = reader.sum()?;

@@ -11,7 +11,7 @@ use avastra_road::{LanePlace, RoadMap, Route};
 /// A place on a lane as a key: the lane, and its station in bits.
 type Place = (usize, u64);
 
-/// What was found, or why it was not.
+/// The results by key; an error says why nothing was found.
 pub type Known<K, T> = RefCell<BTreeMap<K, Result<Rc<T>, String>>>;
 
 /// A map that remembers.
@@ -66,7 +66,7 @@ fn key(place: &LanePlace) -> Place {
     (place.lane.0, place.station_m.to_bits())
 }
 
-/// What is known, or else found now and known from then on.
+/// The known result, or else the one that is found now and known from then on.
 pub fn once<K: Ord, T>(
     known: &Known<K, T>,
     key: K,

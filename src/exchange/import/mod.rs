@@ -1,18 +1,19 @@
 //! OpenSCENARIO XML of others as spaces of the language (LANGUAGE.md has what is read).
 //!
-//! A scenario becomes a space with one row, and a scenario that plays it; a file with a `ParameterValueDistribution` a space with a row
-//! for each of its variations. Others follow their ways as the file's player moves them (`Follow`); the driving system under test
-//! takes the place of whatever moves the ego vehicle in the file. What cannot be said is refused, each with its line; what
-//! drives otherwise here is a note at the head of the space.
+//! A scenario becomes a space with one row, and a scenario that plays it. A file with a `ParameterValueDistribution`
+//! becomes a space with a row for each of its variations. Others follow their ways as the file's player moves them
+//! (`Follow`). The driving system under test takes the place of whatever moves the ego vehicle in the file. Content that
+//! the language cannot say is refused, with its line. Differences in driving are notes at the head of the space.
 //!
-//! `variation` reads the values of a distribution, and `chance` draws those that it leaves to chance. For each variation `story` reads the scenario, with `body`, `position`,
-//! `shape`, `action`, `trigger` and `weather` for what stands in it, through `source`, which fills in each `parameter` and its
-//! `expression`, and `catalogue`, which finds what lies in other files; `vocabulary` refuses what no file may hold. `place` finds
-//! places on the map, `scene` gives everybody a way, to which `ways` joins trajectories, and `phases` what it does, `pace`
-//! their speeds, `condition` the moments at which these begin: as `said`, text with its numbers apart. `order` refuses what may
-//! come at another time, by what `estimate` knows of how everybody begins. `rows` finds how the
-//! numbers follow from the parameters, `sky` how weather changes, and `write` prints the space. A file that avastra exported
-//! carries its scenario (`own`). No file is read here: `cli` gives texts.
+//! `variation` reads the values of a distribution, and `chance` draws those that it leaves to chance. For each variation
+//! `story` reads the scenario, with `body`, `position`, `shape`, `action`, `trigger` and `weather` for its elements. It
+//! reads them through `source`, which fills in each `parameter` and its `expression`, and `catalogue`, which finds the
+//! content of other files. `vocabulary` refuses elements that no file may hold. `place` finds places on the map. `scene`
+//! gives each entity a way, to which `ways` joins trajectories. `phases` writes the actions, `pace` their speeds, and
+//! `condition` the moments at which they begin, as `said`: text with its numbers apart. `order` refuses events that may
+//! come at another time, by what `estimate` knows of how all entities begin. `rows` finds how the numbers follow from the
+//! parameters, `sky` how weather changes, and `write` prints the space. A file that avastra exported carries its scenario
+//! (`own`). No file is read here: `cli` gives texts.
 
 mod across;
 mod action;
@@ -64,7 +65,7 @@ pub use whole::Imported;
 /// How a file is to be read.
 #[derive(Debug, Clone, Copy)]
 pub struct Request<'a> {
-    /// What the space is to be called.
+    /// The name of the space.
     pub name: &'a str,
     /// The entity that is the ego vehicle, if it is not called so.
     pub ego: Option<&'a str>,
@@ -114,7 +115,7 @@ pub fn openscenario(text: &str, request: &Request, files: &dyn Files) -> Result<
     let declared = declared(&document);
     let read = variation::read(&mut source, of_variations.root_element(), &declared, variations_max as usize);
     let Some(distribution) = read.filter(|_| !source.is_refused()) else { return Err(source.refusals()) };
-    // What is wrong with the scenario, and for which values.
+    // The errors of the scenario, and the values with which they occur.
     let of_scenario = |refusals: Vec<Refusal>, values: &Values| {
         let pairs: Vec<String> = values.iter().map(|(name, value)| format!("{name} = {value}")).collect();
         let with = |refusal: Refusal| {

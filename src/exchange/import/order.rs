@@ -1,4 +1,4 @@
-//! What keeps the order of a file: the refusals of events that may come, or end, at another time than in it.
+//! Keeps the order of a file: refuses events that may come, or end, at another time than in it.
 //!
 //! A manoeuvre goes from phase to phase, and asks what is so now; a file's events come side by side, and remember.
 
@@ -14,13 +14,13 @@ use super::source::{Mark, Source};
 use super::story::Event;
 use super::trigger::{Condition, Edge, Pair, PlaceMark, Trigger, When, asks_for_less};
 
-/// What is estimated to come at most this much before what stands above it still counts as coming after it, s.
+/// An event that is estimated to come at most this much before the event above it still counts as coming after it, s.
 const EARLY_S_MAX: f64 = 0.1;
 
 /// Times that differ by less are the same, s.
 const LEAST_S: f64 = 1e-6;
 
-/// When what somebody does comes, and when it is over, if everybody goes on as they begin; `None`: it is not known.
+/// When an event comes, and when it is over, if all entities go on as they begin; `None`: it is not known.
 #[derive(Debug, Clone, Copy)]
 struct Times {
     comes_s: Option<f64>,
@@ -36,13 +36,13 @@ struct Times {
     after_s_min: f64,
 }
 
-/// What somebody does, in its order, and what is known of when.
+/// The events of an entity, in their order, and what is known of their times.
 pub struct Sequence<'e> {
     events: Vec<(&'e Event, Times)>,
 }
 
 impl<'a> Cast<'a> {
-    /// The events of somebody in this order, where each is known to come after those before it; others are refused.
+    /// The events of an entity in this order, where each is known to come after those before it; others are refused.
     pub fn in_sequence<'e>(
         &self,
         source: &mut Source,
@@ -204,7 +204,7 @@ impl<'e> Sequence<'e> {
         source.refuse(&event.mark, reason)
     }
 
-    /// What begins with an event, itself among it.
+    /// The events that begin with an event, itself among them.
     pub fn with(&self, event: &Event) -> impl Iterator<Item = &'e Event> {
         self.events.iter().map(|(other, _)| *other).filter(move |other| same_moment(other, event))
     }
@@ -221,13 +221,13 @@ impl<'e> Sequence<'e> {
         times?.into_iter().reduce(f64::max)
     }
 
-    /// What may still be under way when an event comes: events before it that take a time and of which it is not known that they are over.
+    /// The events that may still be under way when an event comes: they are before it, take a time, and may not be over.
     fn under_way(&self, event: &Event) -> Vec<&'e Event> {
         let at = self.events.iter().position(|(own, _)| core::ptr::eq(*own, event)).unwrap_or(0);
         let (comes_s, after_s_min) =
             self.events.get(at).map_or((None, 0.0), |(_, times)| (times.comes_s, times.after_s_min));
         let is_over = |(other, times): &(&Event, Times)| {
-            // What waits for the end of what waits for its end comes later still.
+            // The event may also wait for another event that waits for the end: then it comes later still.
             let (mut ended, mut seen): (Vec<&Event>, Vec<&Event>) = (vec![event], Vec::new());
             while let Some(last) = ended.pop() {
                 if last.waits_for_the_end_of(other) {
@@ -284,8 +284,8 @@ impl<'e> Sequence<'e> {
         Some(())
     }
 
-    /// Refuses an event that may meet a move to the side, or a trajectory, under way. The field that ends a change of speed which the
-    /// event overwrites without a speed of its own.
+    /// Refuses an event that may meet a lateral move, or a trajectory, under way. Returns the field that ends a change of
+    /// speed which the event overwrites without giving a speed.
     pub fn ends_what_goes_on(&self, source: &mut Source, event: &Event) -> Option<Option<Said>> {
         let mut field = None;
         for other in self.under_way(event) {
@@ -414,8 +414,8 @@ fn takes_s(act: &Act, body: &Body, mps: &mut Option<f64>) -> Option<f64> {
     }
 }
 
-/// Whether what one trigger waits for holds only once what another one waits for has held: in one of its groups the same of the same
-/// two, less far on, and what has come by then.
+/// Whether `then` holds only once `before` has held. All conditions in one group of `before` must have come by then, or
+/// ask the same of the same two, less far on.
 fn is_implied(before: &Trigger, then: &Trigger, has_come: impl Fn(&Condition) -> bool) -> bool {
     let [all] = then.as_slice() else { return false };
     let then: Vec<&Condition> = all.iter().filter(|one| one.kind != When::Always).collect();
@@ -457,8 +457,8 @@ fn is_farther_on(before: &Condition, then: &Condition) -> bool {
     }
 }
 
-/// Whether the second is about the way of the same two as the first, or about the way between outlines, which is shorter than that
-/// between reference points, where more is asked for, and the other way round.
+/// Whether the second is about the distance of the same two as the first. Where more is asked for, it may be about
+/// outlines instead of reference points, because that distance is shorter; where less is asked for, the other way round.
 fn is_of_the_same(pair: &Pair, then: &Pair) -> bool {
     let is_as_far = match asks_for_less(pair.rule) {
         false => then.is_free_space || !pair.is_free_space,
@@ -525,7 +525,7 @@ impl Waiting<'_, '_> {
         Some(())
     }
 
-    /// Refuses the end of a change to a speed that somebody may have at another time, or may never come to.
+    /// Refuses the end of a change to a speed that the entity may have at another time, or may never come to.
     pub fn comes_to_once(
         &self,
         source: &mut Source,
@@ -550,7 +550,7 @@ impl Waiting<'_, '_> {
         if !event.acts.last().is_some_and(takes_time) {
             return Some(());
         }
-        // What cuts it short ends it, too, and then the speed is another one.
+        // An event that cuts it short ends it, too, and then the speed is another one.
         for other in moving
             .entity
             .after(event)
@@ -582,7 +582,7 @@ fn edges_are_alone(source: &mut Source, trigger: &Trigger, all: &[Condition]) ->
 fn runs_on(source: &mut Source, trigger: &Trigger, all: &[Condition]) -> Option<()> {
     for own in all.iter().filter(|one| one.is_running && !one.is_of_act && all.len() > 1) {
         let (When::Begun { name, .. } | When::Ended { name, .. }) = &own.kind else { continue };
-        // What holds while it runs, and after it, holds from its beginning.
+        // A condition that holds while it runs, and after it, holds from its beginning.
         let is_after =
             |other: &Condition| matches!(&other.kind, When::Ended { name: ended, .. } if ended == name);
         let goes_on = trigger.iter().any(|other| other.iter().any(is_after));

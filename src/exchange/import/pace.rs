@@ -15,7 +15,7 @@ use super::source::{Mark, Source};
 /// A shorter wait is none, s.
 const LEAST_S: f64 = 1e-4;
 
-/// The fields of an order that say how fast somebody drives.
+/// The fields of an order that set a vehicle's speed.
 pub const PACE: [&str; 7] = ["speed", "rate", "continuous", "early", "at", "reach", "steady"];
 
 /// The stiffness of the spring by which esmini keeps a distance, for each m/s² of the bound, 1/m.
@@ -189,7 +189,7 @@ impl<'a> Cast<'a> {
         Some(vec![Said::text("speed: ").then(said), Said::text(CONTINUOUS)])
     }
 
-    /// The station at which somebody begins on its way, m; 0 of who has none.
+    /// The station at which an entity begins on its way, m; 0 if it has no way.
     fn begin_m(&self, name: &str) -> f64 {
         self.moving.iter().find(|moving| moving.entity.name == name).map_or(0.0, |moving| moving.at_m)
     }
@@ -211,7 +211,7 @@ impl<'a> Cast<'a> {
         let is_off = self.is_far_off(source, mark, own)? || self.is_far_off(source, mark, &kept.of)?;
         let faces = !is_off && looks_ahead != self.looks_ahead(source, mark, &kept.of)?;
         source.refuse_if(faces, mark, "a distance is kept by those who drive the same way")?;
-        // Who is ahead of two that come towards the ego vehicle is behind along its route.
+        // If two road users come towards the ego vehicle, the one ahead is behind along its route.
         let is_against = !is_off && !looks_ahead;
         let is_ahead = match kept.is_ahead {
             Some(is_ahead) => is_ahead,
@@ -236,7 +236,7 @@ impl<'a> Cast<'a> {
         Some((of, too_far))
     }
 
-    /// Whether somebody beside the ego vehicle drives at one speed from the beginning on.
+    /// Whether a road user beside the ego vehicle drives at one speed from the beginning on.
     fn keeps_its_speed(&self, name: &str) -> bool {
         let Some(entity) = self.story.entity(name) else { return false };
         let is_timed = entity.way.as_ref().is_some_and(|way| way.timing.is_some());

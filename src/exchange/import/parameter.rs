@@ -1,4 +1,4 @@
-//! What a declaration says of its parameter's value: a type, and groups of constraints of which one must hold.
+//! The declaration of a parameter: a type, and groups of constraints of which one must hold for its value.
 
 use roxmltree::Node;
 
@@ -10,8 +10,8 @@ const TYPES: [&str; 8] =
 const RULES: [&str; 6] =
     ["equalTo", "notEqualTo", "lessThan", "lessOrEqual", "greaterThan", "greaterOrEqual"];
 
-/// Refuses a value that is not of the declared type. One that every group of constraints excludes is refused, too, but `Some`
-/// says that it can be read on: what else is wrong with the file does not follow from it.
+/// Refuses a value that is not of the declared type. A value that every group of constraints excludes is refused, too.
+/// Then `Some` says that it can be read on: other errors of the file do not follow from it.
 pub fn check(source: &mut Source, declared: Node, value: &str) -> Option<()> {
     let kind = source.word(declared, "parameterType", &TYPES)?;
     source.refuse_if(!is_of(kind, value), declared, format!("its value `{value}` is no `{kind}`"))?;

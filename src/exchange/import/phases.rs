@@ -1,4 +1,4 @@
-//! What everybody does, phase by phase.
+//! The actions of all entities, phase by phase.
 
 use avastra_lang::model::SPAWN_SPEED_MPS;
 use avastra_road::LanePlace;
@@ -17,7 +17,7 @@ use super::trigger::{Condition, Edge, When};
 /// A distance that is to be reached is, this near to it, m, as for esmini.
 const KEPT_M: f64 = 0.1;
 
-/// Whoever is so near to the end of its way has reached it, m.
+/// An entity that is so near to the end of its way has reached it, m.
 pub const ARRIVES_M: f64 = 0.05;
 
 const TIMES_LATER: &str =
@@ -34,7 +34,7 @@ const BESIDE_TIMES: &str =
 /// A speed that is asked anew at every tick.
 pub const CONTINUOUS: &str = "continuous: true";
 
-/// What somebody was told so far.
+/// The state of an entity after its orders so far.
 pub struct Told {
     /// Its speed, if the file says it.
     pub mps: Option<f64>,
@@ -48,14 +48,14 @@ pub struct Told {
     pub then: Option<Said>,
 }
 
-/// The phases of somebody, as far as they are written.
+/// The phases of an entity, as far as they are written.
 struct Script<'c, 'a, 'e> {
     cast: &'c Cast<'a>,
     moving: &'c Moving<'a>,
     sequence: Sequence<'e>,
     told: Told,
     phases: Vec<Said>,
-    /// What the last phases do, if it takes a while: what may follow.
+    /// The actions of the last phases, if they take a while: what may follow.
     takes: Option<Takes>,
     /// When that ends, s, if its times say so.
     ends_s: Option<f64>,
@@ -300,7 +300,7 @@ impl<'c, 'a, 'e> Script<'c, 'a, 'e> {
 }
 
 impl<'a> Cast<'a> {
-    /// What somebody does, phase by phase.
+    /// The phases of an entity.
     pub fn phases(&self, source: &mut Source, moving: &Moving<'a>) -> Option<Vec<Said>> {
         let entity = moving.entity;
         let is_placed = |act: &Act| matches!(act.kind, ActKind::Ahead(..));
@@ -315,7 +315,7 @@ impl<'a> Cast<'a> {
         let (at_once, later): (Vec<&Event>, Vec<&Event>) =
             events.into_iter().partition(|event| event.when.is_empty());
         let first = at_once.iter().flat_map(|event| &event.acts).filter(|act| !is_placed(act)).collect();
-        // Also one that only placed somebody, which took no time.
+        // An event that only placed the entity counts, too; it took no time.
         let mut before: Vec<&Event> = entity.events.iter().filter(|event| event.when.is_empty()).collect();
         for (event, acts) in by_moment(first, later) {
             let begins = match event {
@@ -334,7 +334,7 @@ impl<'a> Cast<'a> {
         Some(script.phases)
     }
 
-    /// What follows is told where a trajectory ends.
+    /// The state of an entity where a trajectory ends.
     fn told_at_the_end(&self, moving: &Moving<'a>, leg: &Leg, told: &mut Told) {
         (told.at_m, told.lane, told.offset_m) = (leg.end_m, leg.lane, 0.0);
         told.lane_m = leg.lane.map_or(0.0, |lane| self.aside_m(moving, told.at_m, lane));
@@ -392,7 +392,7 @@ impl<'a> Cast<'a> {
     }
 }
 
-/// What takes a while.
+/// Actions that take a while.
 struct Takes {
     /// The words before phases that wait for the end of each part of it.
     then: Vec<Said>,
@@ -414,12 +414,12 @@ fn arrives(station_m: f64) -> Said {
     Said::text("once npc.station >= ").number(station_m - ARRIVES_M, "m").and(" ")
 }
 
-/// Of two actions that begin together the later one counts.
+/// If two actions begin together, the later one counts.
 pub fn instead_of(fields: &mut Vec<Said>, names: &[&str]) {
     fields.retain(|field| !names.contains(&field.name().as_str()));
 }
 
-/// What begins from the start, and then what begins at each moment: one phase each, with the first of its events.
+/// The actions from the start, and then those of each moment: one phase each, with the first of its events.
 fn by_moment<'e>(first: Vec<&'e Act>, later: Vec<&'e Event>) -> Vec<(Option<&'e Event>, Vec<&'e Act>)> {
     let mut groups: Vec<(Option<&Event>, Vec<&Act>)> = Vec::new();
     if !first.is_empty() {

@@ -12,10 +12,10 @@ use super::position::{Beside, Heading, Position, PositionKind};
 use super::source::{Mark, Source};
 use super::story::Story;
 
-/// Who looks along a lane within this angle drives along it, rad: a player's drivers keep their lanes.
+/// An entity that looks along a lane within this angle drives along it, rad: a player's drivers keep their lanes.
 const ALONG_RAD: f64 = 0.3;
 
-/// Who stands within this angle to a lane stands along it, rad.
+/// An entity that stands within this angle to a lane stands along it, rad.
 const STANDS_RAD: f64 = 0.02;
 
 /// A way that is laid along lanes is followed this far, m.
@@ -360,12 +360,12 @@ impl<'a> Places<'a> {
 }
 
 impl Placed {
-    /// Whether somebody who drives from there drives along its lane.
+    /// Whether an entity that drives from there drives along its lane.
     pub fn is_along(&self) -> bool {
         self.lane.is_some() && self.turned_rad.abs() < ALONG_RAD
     }
 
-    /// Whether somebody stands there as its lane leads.
+    /// Whether an entity stands there as its lane leads.
     pub fn stands_along(&self) -> bool {
         self.lane.is_some() && self.turned_rad.abs() < STANDS_RAD
     }
@@ -422,8 +422,8 @@ fn straightest(map: &RoadMap, lane: LaneIndex, passed: &[LaneIndex]) -> Option<L
     fresh.min_by(|a, b| bend_rad(a).total_cmp(&bend_rad(b)))
 }
 
-/// As far as the lanes go on from a place, without turning where they part: places on the way behind each junction, the last one
-/// at its end, and how far that is, m.
+/// The way along the lanes from a place, as far as they go on, without turning where they part. Returns places on the way
+/// behind each junction, the last one at its end, and the length of the way, m.
 pub fn straight_on(map: &RoadMap, start: LanePlace) -> (Vec<LanePlace>, f64) {
     let (mut lane, mut way_m) = (start.lane, map.lane(start.lane).centre.length_m() - start.station_m);
     let (mut passed, mut places) = (vec![lane], Vec::new());

@@ -218,7 +218,7 @@ impl Position {
         }
     }
 
-    /// Whether it is where somebody is already, who looks on as before.
+    /// Whether it is the place and the heading that the entity has already.
     pub fn is_own_place(&self, name: &str) -> bool {
         let PositionKind::RelativeObject { entity, dx_m, dy_m } = &self.kind else { return false };
         entity == name
@@ -237,7 +237,7 @@ fn heading(source: &mut Source, place: Node) -> Option<Heading> {
         }
     }
     let is_relative = match source.word(orientation, "type", &["relative", "absolute"])? {
-        // What it is without the word has changed with 1.3.
+        // The default without the word has changed with 1.3.
         "" => source.minor >= 3,
         word => word == "relative",
     };

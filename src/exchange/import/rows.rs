@@ -49,9 +49,8 @@ enum Kind {
 }
 
 impl Parameters {
-    /// The least that tells the variations apart: of parameters that say the same, one of a speed stays, else a number, else a word,
-    /// and of those alike the first one.
-    /// `names` are those of road users.
+    /// The fewest parameters that tell the variations apart. If several say the same, a speed stays, else a number, else
+    /// a word; among equals the first one stays. `names` are those of road users.
     pub fn of(order: &[String], variations: &[&Values], names: &BTreeSet<&str>) -> Parameters {
         let texts = |name: &String| -> Vec<&str> {
             variations.iter().map(|values| values.get(name).map_or("", String::as_str)).collect()
@@ -301,7 +300,8 @@ impl Parameters {
         group.iter().map(|at| chosen.iter().map(|one| self.rows[*at][*one]).collect()).collect()
     }
 
-    /// What holds of some tuples of values alone, among those that are possible in a group; `None` if it holds of all.
+    /// The condition that holds for some tuples of values alone, among those that are possible in a group; `None` if it
+    /// holds for all.
     fn condition(&self, tuples: &BTreeSet<Vec<usize>>, chosen: &[usize], group: &[usize]) -> Option<String> {
         let (first, rest) = chosen.split_first()?;
         let mut by: BTreeMap<usize, BTreeSet<Vec<usize>>> = BTreeMap::new();

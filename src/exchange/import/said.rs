@@ -13,7 +13,7 @@ pub enum Piece {
     Number(Figure),
 }
 
-/// A number with its unit. Two that are written alike are equal.
+/// A number with its unit. Two that are written the same way are equal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Figure {
     rounded: i64,

@@ -1,4 +1,4 @@
-//! Everybody with a way, a speed and what they do: what the scenario of the language says.
+//! All entities with their ways, speeds and actions: the content of the scenario in the language.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -27,7 +27,7 @@ const BEGINS_M: f64 = 500.0;
 /// A way that is shorter shows nothing, m.
 const WAY_M_MIN: f64 = 20.0;
 
-/// The straight way of somebody who is not in a lane, m: short if it stands.
+/// The straight way of an entity that is not in a lane, m: short if it stands.
 const STRAIGHT_M: f64 = 300.0;
 const STANDING_M: f64 = 10.0;
 
@@ -62,7 +62,7 @@ pub struct Scene {
     pub start: String,
     pub goal: String,
     pub ego_mps: Figure,
-    /// What counts on lanes of which the map states no limit.
+    /// The limit on lanes for which the map states none.
     pub limit_mps: Option<Figure>,
     pub others: Vec<Other>,
 }
@@ -118,7 +118,7 @@ impl Scene {
         let mut others = Vec::new();
         for moving in &cast.moving {
             let Some(phases) = cast.phases(source, moving) else {
-                // Nobody is left out in silence.
+                // No entity is left out in silence.
                 if !source.is_refused() {
                     source.refuse::<()>(&moving.entity.mark, "what it does cannot be said");
                 }
@@ -211,7 +211,7 @@ fn ego_way(source: &mut Source, story: &Story, places: &mut Places) -> Option<(L
 }
 
 impl<'a> Cast<'a> {
-    /// Somebody on the way that it goes.
+    /// The entity on the way that it goes.
     fn on_a_way(&self, source: &mut Source, entity: &'a Entity) -> Option<Moving<'a>> {
         let mut placed = self.places.borrow_mut().of(source, &entity.mark, &entity.name)?;
         let mps = speed(source, self.story, entity, 0)?;
@@ -342,7 +342,7 @@ impl Moving<'_> {
     }
 }
 
-/// What an entity is called in the language.
+/// The name of an entity in the language.
 fn name_of(name: &str, taken: &[String]) -> String {
     let own = small(name);
     let own = if TAKEN.contains(&own.as_str()) { format!("{own}_1") } else { own };

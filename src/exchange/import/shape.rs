@@ -25,7 +25,7 @@ const WAY_M_MAX: f64 = 50_000.0;
 /// Knots of a curve of control points are looked at in so many steps each.
 const STEPS: usize = 16;
 
-/// A way, and when somebody on it is where, if the file says that.
+/// A way, and the times at which an entity is at its places, if the file says that.
 #[derive(Debug, Clone)]
 pub struct Shape {
     pub mark: Mark,

@@ -26,7 +26,7 @@ pub struct Sky {
 }
 
 impl Sky {
-    /// Of changes in the order of the file.
+    /// `changes` stand in the order of the file.
     pub fn of(begins: Weather, changes: &[Change]) -> Sky {
         let mut changes: Vec<&Change> = changes.iter().collect();
         changes.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));

@@ -51,7 +51,7 @@ pub struct Refusal {
 /// Letters of a reason: it may have an expression of the file in it.
 const REASON_MAX: usize = 500;
 
-/// More refusals help nobody.
+/// More refusals do not help.
 const REFUSALS_MAX: usize = 100;
 
 /// Positions may lie in routes and trajectories of other positions so deep.
@@ -72,7 +72,7 @@ pub struct Mark {
     pub at: usize,
 }
 
-/// What can be refused: an element, or the mark of one.
+/// The subject of a refusal: an element, or the mark of one.
 pub trait Marked {
     fn mark(self, source: &Source) -> Mark;
 }
@@ -200,7 +200,7 @@ impl<'f> Source<'f> {
         found
     }
 
-    /// Reads an element with parameters of its own, which have their values unless a reference has given others.
+    /// Reads an element that declares parameters. They have their declared values unless a reference has given others.
     pub fn scoped<T>(&mut self, node: Node, read: impl FnOnce(&mut Self) -> Option<T>) -> Option<T> {
         let before = self.parameters.clone();
         let own = elements(node, "ParameterDeclarations").flat_map(children);
@@ -446,7 +446,7 @@ pub fn plain(name: &str) -> &str {
 /// A value with its parameters: `$name` and `${$name / 3.6}`.
 ///
 /// # Errors
-/// What is not understood.
+/// The part that is not understood.
 pub fn filled(value: &str, parameters: &BTreeMap<String, String>) -> Result<String, String> {
     let value = value.trim();
     if let Some(inner) = value.strip_prefix("${").and_then(|rest| rest.strip_suffix('}')) {

@@ -1,5 +1,5 @@
-//! What an OpenSCENARIO file says, as far as it can be imported, without its map: who is there, where, how fast, and what the
-//! others do when.
+//! The content of an OpenSCENARIO file, as far as it can be imported, without its map: the entities, their places and
+//! speeds, and what the others do when.
 
 use std::collections::BTreeSet;
 use std::rc::Rc;
@@ -24,7 +24,7 @@ use super::weather::{Weather, weather};
 /// The latest minor version that is read.
 const MINOR_MAX: i32 = 3;
 
-/// What one entity does at most: as many phases as a manoeuvre of the language has.
+/// The most actions of one entity: as many as a manoeuvre of the language has phases.
 const PHASES_MAX: usize = 100;
 
 /// How long a scenario is played that names no time for its end, s.
@@ -44,7 +44,7 @@ pub struct Story {
     pub duration_s: f64,
     /// The speed limit of the ego vehicle's road, m/s, which an export of avastra says.
     pub limit_mps: Option<f64>,
-    /// What the file says of itself.
+    /// The description in the file.
     pub description: String,
 }
 
@@ -65,11 +65,11 @@ pub struct Entity {
     pub events: Vec<Event>,
 }
 
-/// What somebody does, and when.
+/// The actions of an entity, and when they begin.
 #[derive(Debug, Clone)]
 pub struct Event {
     pub mark: Mark,
-    /// What it is called: its actions, itself, its manoeuvre, the group of that and the act, each with its kind.
+    /// The names of its actions, the event, its manoeuvre, the manoeuvre group and the act, each with its kind.
     pub names: Vec<(&'static str, String)>,
     pub when: Trigger,
     pub acts: Vec<Act>,
@@ -77,19 +77,19 @@ pub struct Event {
     pub overwrites: bool,
     /// Whether the file lets it happen several times.
     pub comes_again: bool,
-    /// What stops its act: where, and when.
+    /// The trigger that stops its act, and where it stands.
     pub stop: Option<Rc<(Mark, Trigger)>>,
 }
 
 impl Entity {
-    /// What it does that stands after an event.
+    /// The entity's events after this one, in the order of the file.
     pub fn after(&self, event: &Event) -> impl Iterator<Item = &Event> {
         self.events.iter().skip_while(move |other| !core::ptr::eq(*other, event)).skip(1)
     }
 }
 
 impl Event {
-    /// What somebody does from the beginning.
+    /// An action from the beginning, as an event.
     fn of_init(mark: Mark, kind: ActKind) -> Event {
         let acts = vec![Act { mark: mark.clone(), kind }];
         let (names, when) = (Vec::new(), Vec::new());
@@ -134,7 +134,7 @@ impl Story {
     }
 }
 
-/// Reads a file. What cannot be said is refused; `None` if that is so much that nothing can be placed.
+/// Reads a file. Content that the language cannot say is refused; `None` if nothing can be placed without it.
 pub fn read(source: &mut Source, document: &Document, ego: Option<&str>) -> Option<Story> {
     let root = document.root_element();
     let header = check_header(source, root)?;
@@ -158,7 +158,7 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>) -> Opti
         source.note("traffic lights follow the map's controllers, not the phases of the file");
     }
     let entities = entities(source, root);
-    // Who is given one later is taken to have it from the beginning.
+    // An entity that is given a controller later is taken to have it from the beginning.
     if root.descendants().any(|node| node.has_tag_name("AssignControllerAction")) {
         source.controlled.extend(entities.iter().map(|entity| entity.name.clone()));
     }
@@ -255,11 +255,11 @@ struct Cast {
     ego: Entity,
     others: Vec<Entity>,
     ego_actions: usize,
-    /// Of the weather.
+    /// Changes of the weather.
     changes: Vec<Change>,
-    /// Who leaves as the scenario begins.
+    /// The entities that leave as the scenario begins.
     gone: BTreeSet<String>,
-    /// What never comes: its kind and its name.
+    /// The elements that never come: kind and name.
     never: Vec<(&'static str, String)>,
 }
 
@@ -350,7 +350,7 @@ impl Cast {
                     names.push(name);
                 }
             }
-            // Who was named and is not known was told already.
+            // An actor that was named and is not known has been reported already.
             if names.is_empty() && element(actors, "EntityRef").is_some() {
                 continue;
             }
@@ -377,7 +377,7 @@ impl Cast {
         if self.others.iter().zip(&before).all(|(entity, from)| entity.events.len() == *from) {
             return;
         }
-        // What never comes stops nothing.
+        // A trigger that never comes stops nothing.
         let Some(when) = conditions(source, stop).and_then(reduced) else { return };
         let stop = Rc::new((source.mark(stop), when));
         for (entity, from) in self.others.iter_mut().zip(before) {
@@ -421,7 +421,7 @@ impl Cast {
                 continue;
             }
             let begins = begins.get_or_insert_with(|| of_act(source, scope.act)).clone();
-            // What an action asks for is told even where its trigger is refused.
+            // Errors of an action are reported even where its trigger is refused.
             let when = trigger(source, event).zip(begins).and_then(|(own, act)| {
                 let reason =
                     format!("with those of its act it has more than {GROUPS_MAX} groups of conditions");
@@ -471,14 +471,15 @@ impl Cast {
         self.never.iter().any(|(of, known)| of == kind && Some(known.as_str()) == last)
     }
 
-    /// A trigger in which a contact of who acts never comes, nor what waits for that: a contact ends what both do.
+    /// A trigger in which a contact of the acting entity never comes, nor what waits for that: a contact ends what both
+    /// do.
     fn without_contacts(&self, source: &mut Source, mut when: Trigger, own: &[&String]) -> Trigger {
         for condition in when.iter_mut().flatten() {
             let is_over = match &condition.kind {
                 When::Contact(Some((of, with))) => {
                     !own.is_empty() && own.iter().all(|name| [of, with].contains(name))
                 }
-                // What holds it has begun all the same.
+                // The elements around it have begun all the same.
                 When::Begun { kind: "event" | "action", .. } | When::Ended { .. } => {
                     self.never_comes(&condition.kind)
                 }
@@ -494,7 +495,7 @@ impl Cast {
         when
     }
 
-    /// An action of the story that concerns nobody's motion.
+    /// An action of the story that moves no entity.
     fn change(&mut self, source: &mut Source, action: Node, when: Option<&Trigger>) {
         let inner = children(action).next().unwrap_or(action);
         if inner.has_tag_name("EnvironmentAction") {
@@ -541,14 +542,15 @@ impl Scope<'_, '_> {
             [("act", self.act), ("maneuverGroup", self.group), ("maneuver", manoeuvre), ("event", event)];
         let actions = elements(event, "Action").map(|action| ("action", action)).collect::<Vec<_>>();
         let all = outer.into_iter().chain(actions);
-        // A name that is no text stands for nobody: nothing refers to it.
+        // A name that is no text is left out: nothing refers to it.
         let named = |node: Node| super::source::filled(node.attribute("name")?, source.parameters()).ok();
         all.filter_map(|(kind, node)| Some((kind, named(node)?))).collect()
     }
 }
 
 impl Entity {
-    /// Adds an event that is carried out so often. What holds from a time on holds again as soon as the event has ended.
+    /// Adds an event that is executed `times` times. A condition that holds from a time on holds again as soon as the
+    /// event has ended.
     fn repeat(&mut self, source: &mut Source, event: Event, times: f64) {
         let conditions = || event.when.iter().flatten();
         let is_time =
@@ -599,7 +601,7 @@ impl Entity {
         }
     }
 
-    /// What it does from the beginning.
+    /// Takes over an action from the beginning.
     fn begin(&mut self, begun: Act) {
         let Act { mark, kind } = begun;
         match kind {
@@ -717,8 +719,8 @@ fn executions(source: &mut Source, node: Node) -> f64 {
     source.number_or(node, "maximumExecutionCount", 1.0).unwrap_or(1.0)
 }
 
-/// When the scenario ends: at the first of the times that its stop trigger names, each with what must come beside it, or when the ego
-/// vehicle can have gone as far as it names.
+/// When the scenario ends. It ends at the first of the times that its stop trigger names, each with what must come beside
+/// it, or when the ego vehicle can have gone as far as the trigger names.
 fn duration_s(source: &mut Source, storyboard: Node, ego: &str, ego_mps: f64) -> f64 {
     let trigger = element(storyboard, "StopTrigger");
     let (mut latest_s, mut surely_s): (f64, f64) = (0.0, f64::INFINITY);

@@ -40,7 +40,7 @@ pub type Trigger = Vec<Vec<Condition>>;
 pub struct Condition {
     pub mark: Mark,
     pub edge: Edge,
-    /// What it asks for has held, or come, so long ago, s.
+    /// The condition must have held, or come, so long ago, s.
     pub delay_s: f64,
     pub kind: When,
     /// Whether it begins the act, in which the event then waits for its own conditions.
@@ -60,7 +60,7 @@ impl Condition {
     }
 }
 
-/// What a condition asks for: that it holds, begins to hold, or ceases to.
+/// Whether a condition must hold, begin to hold, or cease to hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Edge {
     None,
@@ -93,7 +93,7 @@ pub enum When {
         pair: Pair,
         metres: f64,
     },
-    /// Nobody is in lanes beside an entity, so far ahead of it and so far behind.
+    /// The lanes beside an entity are free, so far ahead of it and so far behind.
     Clear(Box<Clearance>),
     /// The first would reach the second in less than `seconds`.
     Collides {
@@ -161,7 +161,7 @@ impl PartialEq for PlaceMark {
     }
 }
 
-/// Room beside an entity in which nobody is.
+/// Room beside an entity that must be free.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clearance {
     pub of: String,
@@ -169,7 +169,7 @@ pub struct Clearance {
     pub others: Vec<String>,
     pub ahead_m: f64,
     pub behind_m: f64,
-    /// Lanes to the left of its own, from and to; without them all lanes.
+    /// Lanes to the left of the entity's lane, from and to; without them all lanes.
     pub lanes: Option<(i32, i32)>,
     pub is_free_space: bool,
     /// Whether those count who come the other way.
@@ -349,7 +349,7 @@ fn condition(source: &mut Source, node: Node) -> Option<Trigger> {
     Some(if rule == "all" { vec![found] } else { found.into_iter().map(|one| vec![one]).collect() })
 }
 
-/// What a condition asks about an entity.
+/// A condition about an entity.
 fn of_entity(source: &mut Source, inner: Node, of: &str) -> Option<When> {
     let entity = of.to_owned();
     let kind = match inner.tag_name().name() {

@@ -9,7 +9,7 @@ use super::source::{Source, children, element, elements};
 use super::story::check_header;
 use super::vocabulary;
 
-/// The most variations that a file may be asked to have: more are no test that anybody drives.
+/// The most variations that a file may be asked to have: a test with more is not practical.
 pub const VARIATIONS_MAX: u32 = 60_000;
 
 /// The most variations that are read unless more are asked for: what is read within a second.
@@ -21,7 +21,7 @@ const VALUES_MAX: usize = 2_000_000;
 /// Values of parameters, by name.
 pub type Values = BTreeMap<String, String>;
 
-/// What a distribution says.
+/// The content of a distribution.
 #[derive(Debug)]
 pub struct Distribution {
     pub description: String,

@@ -1,8 +1,8 @@
 //! The elements and attributes that a file may have (OpenSCENARIO XML 1.0 to 1.3): what is misspelt, or of a later version, is
 //! refused and not passed over.
 //!
-//! Only elements that are read have a row. Nothing within others is looked at: they are refused as a whole where they matter
-//! (an action that is not read), or say nothing of what is taken over (`Performance`, `License`).
+//! Only elements that are read have a row. Nothing within others is looked at. They are refused as a whole where they
+//! matter (an action that is not read), or say nothing of what is taken over (`Performance`, `License`).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -215,11 +215,11 @@ fn rows() -> BTreeMap<&'static str, (&'static str, &'static str)> {
     ELEMENTS.split(';').filter_map(row).collect()
 }
 
-/// What is said of an element and all within it.
+/// The findings about an element and all within it.
 pub struct Found<'a, 'input> {
     /// Every element and attribute that no version has where it stands, with what is wrong.
     pub unknown: Vec<(Node<'a, 'input>, String)>,
-    /// What may change what the file means and is not read.
+    /// The unread content that may change what the file means.
     pub noted: BTreeSet<String>,
 }
 
@@ -273,7 +273,7 @@ mod tests {
 
     use super::*;
 
-    /// What stands where any element may.
+    /// Elements that stand where any element may.
     const CHOSEN: &str = "ScenarioObject Private GlobalAction TeleportAction LongitudinalAction LateralAction \
         RoutingAction VisibilityAction ControllerAction ActivateControllerAction SpeedAction SpeedProfileAction \
         LongitudinalDistanceAction LaneChangeAction FollowTrajectoryAction AssignRouteAction \

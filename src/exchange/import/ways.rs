@@ -32,7 +32,8 @@ struct Joined<'a> {
 }
 
 impl<'a> Cast<'a> {
-    /// Lets everybody follow its trajectories. Whether one begins at once is asked of where all begin.
+    /// Lets all entities follow their trajectories. Whether a trajectory begins at once depends on where all entities
+    /// begin.
     pub fn join_ways(&mut self, source: &mut Source) {
         for at in 0..self.moving.len() {
             let entity = self.moving[at].entity;
@@ -45,7 +46,7 @@ impl<'a> Cast<'a> {
         }
     }
 
-    /// Somebody with its whole way.
+    /// The entity with its whole way.
     fn joined(&self, source: &mut Source, moving: &Moving<'a>) -> Option<Moving<'a>> {
         let entity = moving.entity;
         let mut joined = Joined { points: Vec::new(), legs: Vec::new(), here: moving.placed };
@@ -159,7 +160,7 @@ impl<'a> Cast<'a> {
         Some(())
     }
 
-    /// Lets somebody drive along its lane to a place.
+    /// Lets an entity drive along its lane to a place.
     fn drive_to(
         &self,
         source: &mut Source,
@@ -225,12 +226,12 @@ impl<'a> Moving<'a> {
     }
 }
 
-/// Whether somebody follows a trajectory, from the beginning or later.
+/// Whether an entity follows a trajectory, from the beginning or later.
 pub fn is_led(entity: &Entity) -> bool {
     entity.way.is_some() || follows(entity).next().is_some()
 }
 
-/// The trajectories that somebody follows during the story, with the events that begin them.
+/// The trajectories that an entity follows during the story, with the events that begin them.
 fn follows(entity: &Entity) -> impl Iterator<Item = (&Event, &Way)> {
     entity.events.iter().flat_map(|event| {
         event.acts.iter().filter_map(move |act| match &act.kind {
@@ -240,7 +241,7 @@ fn follows(entity: &Entity) -> impl Iterator<Item = (&Event, &Way)> {
     })
 }
 
-/// Whether somebody moves by an event.
+/// Whether an event moves its entity.
 pub fn moves(event: &Event) -> bool {
     let stays = |act: &Act| {
         matches!(act.kind, ActKind::Ahead(..) | ActKind::Follow(_) | ActKind::Speed(Speed::Absolute(0.0), _))
@@ -248,7 +249,7 @@ pub fn moves(event: &Event) -> bool {
     !event.acts.iter().all(stays)
 }
 
-/// Whether somebody moves by an event that comes before the one with which its trajectory begins.
+/// Whether an event moves the entity and comes before the one with which its trajectory begins.
 fn moves_before(events: &[Event], begins: &Event) -> bool {
     let at = events.iter().position(|event| core::ptr::eq(event, begins));
     events.iter().enumerate().any(|(nth, event)| {

@@ -5,9 +5,9 @@ use roxmltree::Node;
 use super::catalogue;
 use super::source::{Source, children, element};
 
-/// Levels of the engine's sky, and what each reaches up to: rain by the bounds of light and moderate rain (WMO), as a part
-/// of the most where a file of 1.0 gives no millimetres; fog by the range of sight; wetness by the part of friction that
-/// is left.
+/// Levels of the engine's sky, and the upper limit of each. Rain: the bounds of light and moderate rain (WMO), as a part
+/// of the most where a file of 1.0 gives no millimetres. Fog: the range of sight. Wetness: the part of friction that is
+/// left.
 const LEVELS: [&str; 4] = ["None", "Light", "Moderate", "High"];
 const RAIN_MMPH: [f64; 3] = [0.0, 2.5, 10.0];
 const RAIN_PART: [f64; 3] = [0.0, 0.2, 0.5];
@@ -34,7 +34,7 @@ const OKTAS: [&str; 10] = [
     "nineOktas",
 ];
 
-/// What an `EnvironmentAction` sets.
+/// The values that an `EnvironmentAction` sets.
 #[derive(Debug, Clone, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Weather {
     /// The engine's word for the time of day.
@@ -44,7 +44,7 @@ pub struct Weather {
 }
 
 impl Weather {
-    /// What is set by one action and then by another.
+    /// The values after one action and then another.
     pub fn then(self, later: Weather) -> Weather {
         let mut sky = self.sky;
         for (level, new) in sky.iter_mut().zip(later.sky) {

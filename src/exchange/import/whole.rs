@@ -23,7 +23,7 @@ pub struct Imported {
     pub scenario: Option<String>,
     /// The maps, as paths from the file of the other tool; the text names each by its file name alone.
     pub maps: BTreeSet<String>,
-    /// What drives otherwise here than the file says.
+    /// Differences between the drive here and the file.
     pub notes: BTreeSet<String>,
 }
 
@@ -51,7 +51,8 @@ pub struct Whole<'a> {
 }
 
 impl Whole<'_> {
-    /// Reads the scenario with the values of one variation. What is refused comes with whether the file itself excludes the values.
+    /// Reads the scenario with the values of one variation. A refusal comes with whether the file itself excludes the
+    /// values.
     pub fn add(
         &mut self,
         document: &Document,
@@ -61,7 +62,7 @@ impl Whole<'_> {
         asked: &Values,
     ) -> Result<(), (Vec<Refusal>, bool)> {
         let mut source = Source::new(Rc::clone(lines), asked, library);
-        // What is told of values that the file excludes is dropped, so it is told again of others.
+        // Reports about values that the file excludes are dropped, so they are repeated for other values.
         if !self.is_known {
             let found = vocabulary::looked_over(document.root_element());
             self.is_known = found.unknown.is_empty();

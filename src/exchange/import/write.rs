@@ -91,7 +91,7 @@ type Home<'a> = (&'a str, &'a str, &'a str, Figure, Option<Figure>);
 struct Space<'a> {
     variants: &'a [Variant],
     parameters: Parameters,
-    /// What the file is called.
+    /// The name of the file.
     own: String,
     /// Each with its name.
     roads: Vec<(Home<'a>, String)>,
@@ -219,7 +219,7 @@ impl<'a> Space<'a> {
         text
     }
 
-    /// An action that lets everybody of a group of variations appear.
+    /// An action that lets all entities of a group of variations appear.
     fn action(
         &mut self,
         name: &str,
@@ -298,7 +298,7 @@ impl<'a> Space<'a> {
         format!("rule {name}_is_there on {name}: {cases}\n")
     }
 
-    /// The name of a body of somebody's size.
+    /// The name of a body of the road user's size.
     fn body(&mut self, other: &Other) -> String {
         let body = &other.body;
         let [length, width, height] = [body.length_m, body.width_m, body.height_m].map(number);
@@ -314,14 +314,14 @@ impl<'a> Space<'a> {
         self.declare("body", &if is_known { format!("{name}_1") } else { name }, &fields)
     }
 
-    /// The name of somebody's trajectory, which every road of its map has.
+    /// The name of the road user's trajectory, which every road of its map has.
     fn trajectory(&mut self, other: &Other, map: &str) -> String {
         let road = self.roads.iter().find(|((of, ..), _)| *of == map).map_or("", |(_, name)| name.as_str());
         let fields = format!("{{ road: {road}, {} }}", other.trajectory);
         self.declare("trajectory", &format!("{}_way", other.bearer), &fields)
     }
 
-    /// The name of a declaration, which is made if nobody has made it yet.
+    /// The name of a declaration, which is made if it does not exist yet.
     fn declare(&mut self, kind: &str, name: &str, fields: &str) -> String {
         let known = self.made.iter().find(|(own, of, _)| own == fields && of == name);
         if let Some((_, _, known)) = known {
@@ -333,7 +333,7 @@ impl<'a> Space<'a> {
         known
     }
 
-    /// What everybody does in some variation: those whose phases differ in numbers alone do one manoeuvre.
+    /// The manoeuvres in all variations. Road users whose phases differ in numbers alone share one manoeuvre.
     fn manoeuvres(&mut self, groups: &BTreeMap<String, Vec<usize>>, order: &[String]) -> Manoeuvres {
         let variants = self.variants;
         let mut found: Vec<(String, Vec<&Other>)> = Vec::new();
@@ -431,7 +431,7 @@ fn figures(other: &Other) -> Vec<Figure> {
     other.phases.iter().flat_map(Said::figures).collect()
 }
 
-/// For each number of somebody's phases the word before it.
+/// The word before each number in the road user's phases.
 fn words(other: &Other) -> Vec<String> {
     let mut words = Vec::new();
     for phase in &other.phases {

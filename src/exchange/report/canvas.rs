@@ -97,7 +97,7 @@ pub fn thinned(points: &[Vec2]) -> Vec<Vec2> {
     for index in 1..points.len() {
         let lies_on_the_way = |point: &Vec2, to: &Vec2| {
             let (way, aside) = (to - points[last], point - points[last]);
-            // What turns back is needed, however near it passes.
+            // A point at which the line turns back is needed, however near it passes.
             way.perp(&aside).abs() <= OFF_M * way.norm() && way.dot(&aside) > 0.0 && aside.norm() < way.norm()
         };
         // All that was left out since the last point that was kept, or a wide bend would become a straight line.

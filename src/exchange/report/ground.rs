@@ -10,7 +10,7 @@ use super::columns::Columns;
 /// Lines are kept to this, m.
 const STEP_M: f64 = 0.01;
 
-/// What lies farther than this from the bounds of the route is left out, m.
+/// Everything farther than this from the bounds of the route is left out, m.
 const AROUND_M: f64 = 150.0;
 
 /// A wider gap between two lanes is a median, m.

@@ -1,4 +1,4 @@
-//! What goes on in the driving system while a scenario is played: its pedals, what it perceives, predicts and plans.
+//! The driving system while a scenario is played: its pedals, and what it perceives, predicts and plans.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -112,7 +112,7 @@ impl Mind {
         })
     }
 
-    /// What it believed to be there.
+    /// The objects that it believed to be there.
     pub fn tracks(&self, columns: &mut Columns) -> Vec<Value> {
         let mut told = |((number, from), track): (&(u32, usize), &Track)| {
             let object = &track.object;

@@ -1,5 +1,5 @@
-//! Results for people: pages to look at (`page`, with what `recording`, `mind`, `ground` and `overview` put into it),
-//! pictures of maps and of moments of an episode, tables of text, and the text of all studies (`results`).
+//! Results for people: pages to look at (`page`, with the data of `recording`, `mind`, `ground` and `overview`), pictures
+//! of maps and of moments of an episode, tables of text, and the text of all studies (`results`).
 
 mod canvas;
 mod columns;

@@ -1,4 +1,4 @@
-//! What a page says of a whole run, training, study or estimate, beside its scenarios.
+//! The part of a page about a whole run, training, study or estimate, beside its scenarios.
 
 use serde_json::{Value, json};
 
@@ -10,9 +10,9 @@ use avastra_campaign::run::{
 use avastra_drivers::external::Attached;
 use avastra_world::action::ActionTable;
 
-/// What a run or a training found: totals, groups of like failures, rows on roads, refusals, the curve of learning, and what was
-/// learned. `settings` is the text of its `run.yaml`, `results` what a finished training wrote, `heat` the maps of how
-/// actions ended.
+/// The results of a run or a training: totals, groups of similar failures, rows on roads, refusals, the curve of
+/// learning, and what was learned. `settings` is the text of its `run.yaml`. `results` is what a finished training wrote.
+/// `heat` is the maps of how actions ended.
 ///
 /// # Errors
 /// If the database cannot be read.
@@ -52,7 +52,7 @@ fn requirements(database: &Database, table: Option<&ActionTable>) -> Result<Vec<
     Ok(database.requirements()?.into_iter().map(told).collect())
 }
 
-/// What is added to recurrences where the driving system says that it is not deterministic.
+/// The remark on recurrences where the driving system says that it is not deterministic.
 fn mixed(settings: &str) -> Option<&'static str> {
     let told = told_in(settings)?;
     told.external.filter(|attached| !attached.is_deterministic()).map(|_| MIXED)
@@ -70,7 +70,7 @@ pub fn of_estimate(results: &Value, settings: &str) -> Value {
     })
 }
 
-/// What a page says of settings.
+/// The part of the settings that a page shows.
 #[derive(serde::Deserialize)]
 struct Told {
     space: String,
@@ -95,8 +95,8 @@ fn told_in(settings: &str) -> Option<Told> {
 /// The traffic profile of runs that ask for none.
 const CAREFUL: &str = "careful";
 
-/// What was played against what, by the settings of a run, a training, a study or an estimate: name and text of each.
-/// Nothing if they are of a version that wrote them otherwise.
+/// The conditions of a run, a training, a study or an estimate, by its settings: name and text of each. Nothing if they
+/// are of a version that wrote them otherwise.
 fn conditions(settings: &str) -> Vec<(&'static str, String)> {
     let Some(of) = told_in(settings) else { return Vec::new() };
     let program = of.external.as_ref().map(Attached::name);

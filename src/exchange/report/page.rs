@@ -1,6 +1,6 @@
 //! A page of HTML that holds everything: style, script and data. It opens from a file, and asks nothing of a network.
 //!
-//! The script is ES modules, one file for each subject; here they are joined into one, in the order in which they use
+//! The script is ES modules, one file for each subject. Here they are joined into one, in the order in which they use
 //! each other, without their `import` lines, the word `export` and documentation. A name is therefore declared once in
 //! all of them (kept by `tests/page`); `tests/interop/report.sh` opens pages in a browser.
 
@@ -63,9 +63,9 @@ pub struct Scene {
 /// Everything that a page shows.
 pub struct Page {
     pub title: String,
-    /// What it says of a whole run, training or study; `Null` for scenarios alone.
+    /// The part about a whole run, training or study; `Null` for scenarios alone.
     pub overview: Value,
-    /// What it leaves out or could not play, in words.
+    /// The parts that it leaves out or could not play, in words.
     pub remarks: Vec<String>,
     pub scenes: Vec<Scene>,
     /// Name of the other driving system, if two are compared.
@@ -105,7 +105,7 @@ impl Page {
             "schema": 1, "title": self.title, "avastra": VERSION, "engine": ENGINE, "quantisation": quantisation(),
             "overview": self.overview, "remarks": self.remarks, "compared_with": self.compared_with, "scenarios": listed,
         });
-        // What stands in the data must not end the element that holds it.
+        // Nothing in the data may end the element that holds it.
         let index = index.to_string().replace('<', "\\u003c");
         let (title, script) = (in_markup(&self.title), script());
         // Each part is looked for in the frame alone, whatever the others hold.

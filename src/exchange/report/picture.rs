@@ -1,9 +1,9 @@
 //! Top views as SVG, for papers and tickets: road, signals, ego vehicle, others, what is perceived and what is planned.
 //!
-//! One panel is one moment, north up, as near as the ego vehicle and what it hits allow; each has its own scale. True road
-//! users are filled, with their heading, their speed (an arrow for the way of the next second), the lights of those that
-//! brake, and their way since the first panel. What the driving system believes is dashed, so that a missed or
-//! misplaced object is seen at a glance. A caption says in words what a panel shows.
+//! One panel is one moment, north up, as near as the ego vehicle and what it hits allow; each has its own scale. True
+//! road users are filled. They have their heading, their speed (an arrow for the way of the next second), the lights of
+//! those that brake, and their way since the first panel. The beliefs of the driving system are dashed, so that a missed
+//! or misplaced object is seen at a glance. A caption says in words what a panel shows.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -40,7 +40,7 @@ const VELOCITY_S: f64 = 1.0;
 /// Height of names, px.
 const NAME_PX: f64 = 12.0;
 
-/// What one panel shows.
+/// The content of one panel.
 pub struct Snapshot {
     pub world: World,
     pub status: Status,
@@ -50,13 +50,13 @@ pub struct Snapshot {
     pub braking: BTreeSet<u32>,
 }
 
-/// What a picture is about.
+/// The subject of a picture.
 pub struct Subject {
     /// In a sentence.
     pub title: String,
     /// Number and time of what the ego vehicle hits, if it hits anything.
     pub hit: Option<(u32, f64)>,
-    /// What the author calls road users, by number, where the engine has no name for them.
+    /// The author's names for road users, by number, where the engine has no name for them.
     pub names: BTreeMap<u32, String>,
 }
 

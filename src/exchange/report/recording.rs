@@ -1,8 +1,8 @@
 //! A scenario played again and kept tick by tick, for the page.
 //!
-//! What is true ([`Recorder`]) and what the driving system commands (`mind`) is kept at every tick; what it perceives
-//! every 0.1 s, and what it plans and predicts every 0.2 s, because it thinks no faster. All of it in columns (`columns`)
-//! with the steps below.
+//! The truth ([`Recorder`]) and the commands of the driving system (`mind`) are kept at every tick. Its perception is
+//! kept every 0.1 s, its plans and predictions every 0.2 s, because it thinks no faster. All are kept in columns
+//! (`columns`) with the steps below.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -34,7 +34,7 @@ const SAME_S: f64 = 0.005;
 
 /// Steps of the columns; half a step is how far a number may be off.
 const PLACE_M: f64 = 0.01;
-/// Of margins, SI.
+/// Step of margins, SI.
 const MARGIN_STEP: f64 = 0.01;
 const HEADING_RAD: f64 = 0.001;
 pub(super) const SPEED_MPS: f64 = 0.01;
@@ -47,7 +47,7 @@ pub(super) const SKETCH_M: f64 = 0.1;
 /// Ticks between two moments at which plans and predictions are kept.
 pub(super) const THOUGHT_TICKS: u64 = 2 * FRAME_TICKS;
 
-/// What the page must state of the numbers in it.
+/// The accuracy of the numbers, which the page must state.
 pub fn quantisation() -> Value {
     json!({
         "place_m": PLACE_M / 2.0, "heading_rad": HEADING_RAD / 2.0, "speed_mps": SPEED_MPS / 2.0,
@@ -76,7 +76,7 @@ pub struct Recording {
 }
 
 /// Plays a scenario with the driving system that it was recorded with, and keeps everything. `source` is the text of its
-/// file. What only further plays could show, causes, recurrence and minimality, is not checked.
+/// file. Causes, recurrence and minimality, which only further plays could show, are not checked.
 ///
 /// # Errors
 /// If it cannot be played any more, as [`Stage::new`] tells.
@@ -103,7 +103,7 @@ pub fn record_another(
     source: &str,
 ) -> Result<(Recording, Value), RunError> {
     let stage = Stage::new(table, scenario)?;
-    // What the file claims, it claims of the recorded driving system.
+    // The claims of the file are about the recorded driving system.
     let recording = played(&stage, (table, scenario), other, source, |_| false)?;
     let change = match (first.main, recording.main, recording.log.end) {
         (Some(index), _, _) => {
@@ -131,8 +131,8 @@ pub fn record_another(
     Ok((recording, change))
 }
 
-/// What kept the obstacle of a collision from appearing in another drive: mostly a rule that its author wrote and that refuses
-/// the spawn at the other speed. `None` if that drive was over before.
+/// Why the obstacle of a collision did not appear in another drive. Mostly a rule of its author refuses the spawn at the
+/// other speed. `None` if that drive was over before.
 fn refused_there(log: &EpisodeLog, index: usize, other: &EpisodeLog) -> Option<String> {
     let obstacle = log.collisions[index].contact.obstacle;
     let appears =
@@ -308,7 +308,7 @@ fn crashes(table: &ActionTable, log: &EpisodeLog) -> Vec<Value> {
     .collect()
 }
 
-/// What the ego vehicle did not keep, and which careful drivers would have, as the file claims.
+/// The rules that the ego vehicle broke, and that careful drivers would have kept, as the file claims.
 fn breaches(table: &ActionTable, scenario: &Scenario, log: &EpisodeLog) -> Vec<Value> {
     let told = |breach: &Breach| {
         let RequirementDef { name, docs, formula, margin, .. } =

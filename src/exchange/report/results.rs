@@ -1,5 +1,5 @@
-//! What all studies found, as one text in Markdown: `RESULTS.md`. It follows from the studies' files and from what was kept
-//! of playing them, and from nothing else, so it is written again to the same bytes.
+//! The results of all studies, as one text in Markdown: `RESULTS.md`. It follows only from the studies' files and from
+//! what was kept of playing them, so it is written again to the same bytes.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use avastra_campaign::study::{
 
 use super::study::estimate;
 
-/// What stands before the first chapter; `{folder}` is where the studies are.
+/// The text before the first chapter; `{folder}` is where the studies are.
 const HEAD: &str = "\
 # Results
 
@@ -36,7 +36,7 @@ pub struct Chapter {
     /// The command that plays it.
     pub command: String,
     pub file: StudyFile,
-    /// What the file asks for today.
+    /// The settings that the file asks for today.
     pub wanted: StudySettings,
     pub played: Option<Played>,
 }
@@ -147,7 +147,7 @@ fn duration(time_s: f64) -> String {
     }
 }
 
-/// What a measure is, above its table.
+/// The title of a measure, above its table.
 fn title(measure: &str, played: &Played) -> String {
     let episodes = played.settings.evaluation.episodes;
     match measure {

@@ -5,7 +5,7 @@ use avastra_campaign::study::{
     AgentResults, BaselineComparison, QUICK_EPISODES, QUICK_REPEATS, Rate, RoadResults, StudyResults,
 };
 
-/// What every terminal shows in a line.
+/// The width that every terminal shows in a line.
 const WIDTH_MAX: usize = 80;
 
 /// Measures by which comparisons are printed.
@@ -160,8 +160,8 @@ fn with_interval(value: f64, interval: Option<Interval>) -> String {
     }
 }
 
-/// Columns side by side; all but the first are aligned right. What does not fit in a line goes on below, beside the first
-/// column again.
+/// Columns side by side; all but the first are aligned right. Columns that do not fit in a line go on below, beside the
+/// first column again.
 fn table<'a>(head: impl IntoIterator<Item = &'a str>, rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut lines = vec![head.into_iter().map(str::to_owned).collect::<Vec<_>>()];
     lines.extend(rows);

@@ -1,4 +1,4 @@
-//! What became of every row on every road, as text.
+//! The outcome of every row on every road, as text.
 
 use avastra_campaign::trial::{Cell, Outcome};
 use avastra_world::action::Count;

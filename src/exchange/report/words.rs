@@ -1,4 +1,4 @@
-//! What several pages and pictures say in the same words.
+//! Words that several pages and pictures share.
 
 use avastra_lang::model::vocabulary::{Level, Phenomenon, TimeOfDay, Word};
 

@@ -307,7 +307,7 @@ impl Checker {
         }
     }
 
-    /// What an effect does; several things if it is a row of road users.
+    /// Compiles an effect; gives several if it spawns a row of road users.
     fn effect(&mut self, effect: &ast::Effect, place: &Place<'_>) -> Option<Vec<EffectDef>> {
         match &effect.kind {
             ast::EffectKind::Set { state, key, value } => {
@@ -344,7 +344,7 @@ impl Checker {
         }
     }
 
-    /// What the ego vehicle's next traffic light is told.
+    /// Reads an order to the ego vehicle's next traffic light.
     fn light(&mut self, fields: &[ast::Field], place: &Place<'_>, span: Span) -> Option<LightDef> {
         self.note_fields(fields, LightField::ALL, place);
         let fields = self.fields_known::<LightField>(fields);

@@ -17,7 +17,7 @@ use avastra_base::units::{Dimension, quantity_short};
 const KG_PER_T: f64 = 1000.0;
 
 impl BodyField {
-    /// What a number may be: its dimension, and both ends in SI. `None` for what is no number.
+    /// The range of a number: its dimension, and both ends in SI. `None` for a field without a number.
     pub fn range(self) -> Option<(Dimension, f64, f64)> {
         Some(match self {
             BodyField::Like => return None,
@@ -109,7 +109,7 @@ impl Checker {
         self.reject(error.at(value.span, format!("must lie within {} .. {}", shown(low), shown(high))))
     }
 
-    /// What a spawn calls a body: a word of the engine, a body of the author's own, or an expression of an enum whose
+    /// Reads the body of a spawn: a word of the engine, a body that the author declared, or an expression of an enum whose
     /// variants are such words.
     pub(super) fn body_word(&mut self, expr: &ast::Expr, place: &Place<'_>) -> Option<WordExpr<BodyWord>> {
         let known = |checker: &Checker, name: &str, span| {

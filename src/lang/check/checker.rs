@@ -1,7 +1,7 @@
 //! The checker: declarations in, a sound [`Space`] or diagnostics out.
 //!
-//! It goes on after a mistake, so that one run shows all mistakes: a broken declaration becomes `None`, and
-//! no diagnostic is reported for what depends on it.
+//! It goes on after a mistake, so that one run shows all mistakes. A broken declaration becomes `None`, and no diagnostic
+//! is reported for anything that depends on it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -52,7 +52,8 @@ pub(super) struct Doers {
     pub spawners: Vec<usize>,
 }
 
-/// The requirements of a space. All names are known from the first one on: one that asks about another is told why it cannot.
+/// The requirements of a space. All names are known from the first one on: one that asks about another is told why it
+/// cannot.
 pub(super) struct Required {
     pub names: Names,
     /// Those that were checked and have no mistake, each with the dimension of its margin.
@@ -62,13 +63,13 @@ pub(super) struct Required {
 /// Names that are known before any declaration is checked.
 #[derive(Default)]
 pub(super) struct Announced {
-    /// Of all functions: constants are checked before them and cannot call them.
+    /// The names of all functions: constants are checked before them and cannot call them.
     pub functions: BTreeSet<String>,
-    /// Of every declared road, driven or not.
+    /// The names of all declared roads, driven or not.
     pub roads: Vec<String>,
 }
 
-/// How much was made of a short text so far. What is too much is refused before it takes long.
+/// How much a short text has made so far. Anything too large is refused before it takes long.
 #[derive(Default)]
 pub(super) struct Spent {
     /// Values that parameters list.
@@ -92,7 +93,7 @@ pub(super) struct Checker {
     pub(super) trajectories: Vec<TrajectoryDef>,
     /// Names that the spawns of all actions give.
     pub(super) bearers: Vec<String>,
-    /// What the road users of each name can be told at most.
+    /// The fields that the road users of each name can be told at most.
     pub(super) obeys: BTreeMap<String, Told>,
     pub(super) manoeuvre_names: Names,
     /// `None` stands for a broken one.
@@ -124,7 +125,7 @@ pub(super) struct Checker {
     pub(super) claims: Vec<Claim>,
     /// Declarations that are not checked, because another has their name.
     pub(super) doubles: BTreeSet<Span>,
-    /// What each name stands for, all through.
+    /// The meaning of each name, in all files.
     pub(super) references: References,
     pub(super) spent: Spent,
     pub(super) diagnostics: Vec<Diagnostic>,
@@ -139,14 +140,14 @@ pub struct Claim {
     pub rows: Vec<usize>,
 }
 
-/// What was found of rows, of which the places in the world were not asked for yet.
+/// The findings about rows, before the places in the world are looked up.
 #[derive(Debug, Clone, Default)]
 pub struct Runs {
     pub claims: Vec<Claim>,
     pub runs_in: RunsIn,
 }
 
-/// What checking the declarations of a space gives.
+/// The result of checking the declarations of a space.
 pub(super) struct Checked {
     /// `None` if it is not sound.
     pub space: Option<Space>,
@@ -155,7 +156,7 @@ pub(super) struct Checked {
     pub references: References,
 }
 
-/// What the reader of files knows about the root of a space.
+/// The facts that the reader of files knows about the root of a space.
 pub(super) struct Root {
     /// Claims and unused declarations are looked for in this file alone. A used file is checked for them
     /// when it is the root itself.

@@ -120,7 +120,7 @@ impl Checker {
             let is_out = |number: &Rational| {
                 *number < Rational::ZERO || *number > Rational::integer(i64::from(ACTION_ODDS_MAX))
             };
-            // What is not written out is proved once all is known.
+            // A computed number is proved later, once everything is known.
             if matches!(&odds.kind, ExprKind::Number(number) if is_out(number)) {
                 return checker.reject(odds_out_of_bounds(odds.span));
             }
@@ -138,8 +138,8 @@ impl Checker {
         odds
     }
 
-    /// The odds of so many things: `value` reads them, `named` gives those of the things that a line names. A line counts for
-    /// what has no odds yet. What no line names has none.
+    /// The odds of so many things: `value` reads them, `named` gives the things that a line names. A line counts for those
+    /// of them that have no odds yet. A thing that no line names has none.
     fn shares<T: Clone>(
         &mut self,
         declared: &ast::Odds,
@@ -180,7 +180,7 @@ impl Checker {
         let odds = self.shares(declared, count, Checker::odds_of, |checker, names| {
             names.iter().filter_map(|name| checker.variant(name, of)).collect()
         });
-        // What is not named is as likely as before.
+        // A variant without a line of its own is as likely as before.
         let odds: Vec<u32> = odds.into_iter().map(|odds| odds.unwrap_or(1)).collect();
         if odds.iter().all(|odds| *odds == 0) {
             let message = format!("no `{}` is ever drawn", declared.name.text);
@@ -546,7 +546,7 @@ impl Checker {
         })
     }
 
-    /// What `known` says of each variant of an enum.
+    /// The words that `known` gives for the variants of an enum.
     pub(super) fn words_of<T>(
         &mut self,
         kind: &str,
@@ -558,7 +558,7 @@ impl Checker {
             let name = self.references.type_name(ty);
             let message = format!("type mismatch: wanted a {kind}, found `{name}`");
             let error = Diagnostic::error(code::TYPE_MISMATCH, message);
-            // What is said of a word that there is not, says which there are.
+            // The help for an unknown word lists the known words.
             let help = known(self, "", span).err().and_then(|unknown| unknown.help);
             return self.reject(error.at(span, format!("this is {}", article(&name))).help_if(help));
         };

@@ -1,8 +1,8 @@
 //! The differences between two spaces: declarations, rules, rows and ranges.
 //!
-//! Declarations are compared by exactly the texts that the digest covers (`meaning`), so a difference is told if and only if
-//! the digests differ. Besides, rules are compared by what they leave of the ranges that both spaces have, rows by their
-//! labels, and draws by the ranges that all rules together leave.
+//! Declarations are compared by exactly the texts that the digest covers (`meaning`), so a difference is told if and only
+//! if the digests differ. Rules are also compared by the ranges that they leave, where both spaces have them. Rows are
+//! compared by their labels, and draws by the ranges that all rules together leave.
 
 use core::fmt;
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,7 +19,7 @@ pub struct Difference {
     pub change: Change,
     /// ``rule `npc_speed` ``, ``row `rain(how: High)` ``.
     pub subject: String,
-    /// What has changed in figures; may be empty.
+    /// The change in figures; may be empty.
     pub detail: String,
 }
 
@@ -92,8 +92,8 @@ impl<'a> Side<'a> {
         self.rows.get(other.label.as_str()).copied()
     }
 
-    /// Whether something is declared in another way that a rule's meaning may hang on besides its own text. That of an action
-    /// is not: what its parameters may be is no work of the rule's.
+    /// Whether something is declared in another way that a rule's meaning may hang on besides its own text. That of an
+    /// action is not: what its parameters may be is no work of the rule's.
     fn has_other_terms(&self, other: &Side<'_>) -> bool {
         let differs = |of: &Side<'_>, than: &Side<'_>| {
             let mut terms =
@@ -248,7 +248,7 @@ fn compared(
 /// A range for each name.
 type Ranges = [(Arc<str>, Interval)];
 
-/// What one rule alone leaves of each range of a row; `None` if it leaves nothing.
+/// The part of each range of a row that one rule alone leaves; `None` if it leaves nothing.
 fn left(space: &Space, rule: usize, row: &Row, road: &Road) -> Option<Vec<(Arc<str>, Interval)>> {
     let alone = RulesInForce::only(space, rule);
     RowRules { space, row, road: Some(&road.facts), in_force: &alone }.ranges()

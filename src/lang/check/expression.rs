@@ -19,7 +19,7 @@ use crate::syntax::{Diagnostic, ast, listed, nearest, one_of};
 use avastra_base::units;
 use avastra_base::units::{Dimension, Rational};
 
-/// What an expression may name where it stands, apart from constants and functions.
+/// The names that an expression may use where it stands, apart from constants and functions.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Place<'a> {
     pub locals: &'a [(String, Type)],
@@ -51,7 +51,7 @@ fn fact_of_named(part: &str) -> Option<Fact> {
 /// Most enums that the error about an ambiguous variant names.
 const OWNERS_NAMED_MAX: usize = 12;
 
-/// What a bare name stands for.
+/// The thing that a bare name stands for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Named {
     /// The parameter, constant or state of that index.
@@ -64,7 +64,7 @@ enum Named {
 }
 
 impl Checker {
-    /// What a bare name means: whichever of these comes first.
+    /// The meaning of a bare name: the first of these that exists.
     fn named(&self, name: &str, place: &Place<'_>) -> Named {
         let local = || place.locals.iter().position(|(local, _)| local == name).map(Named::Local);
         let constant = || self.constant_places.get(name).copied().map(Named::Constant);
@@ -895,8 +895,8 @@ pub(crate) fn unknown_unit(word: &ast::Name) -> Diagnostic {
     }
 }
 
-/// What to write in place of a number without a unit, or with a unit of something else; `None` for an expression that is no
-/// such number, and where no unit is wanted.
+/// The text to write in place of a number that lacks a unit or has a wrong one; `None` for other expressions, and where no
+/// unit is wanted.
 pub(super) fn unit_help(expr: &ast::Expr, wanted: Type) -> Option<String> {
     match &expr.kind {
         ast::ExprKind::Number(number) => number_help("", number, dimension(wanted)),
@@ -922,7 +922,7 @@ pub(super) fn number_help(sign: &str, number: &ast::Number, wanted: Dimension) -
     })
 }
 
-/// What is said of a number beyond those of states.
+/// The message for a number beyond the limits of states.
 pub(super) const NUMBER_MAX: &str = "the largest is 2^53 - 1, either side of 0";
 
 /// Whether no state may have a number. Compared exactly, because 2^53 + 1 would be rounded.

@@ -32,7 +32,7 @@ pub struct Loaded {
     pub remarks: Vec<Diagnostic>,
     /// In order of reading, the root first, so never empty; a file's [`FileId`] is its position.
     pub files: Vec<LoadedFile>,
-    /// What each name of the files stands for, as far as it can be told of files with mistakes.
+    /// The meaning of each name in the files, as far as mistakes leave it known.
     pub references: References,
     /// The space that the root is or uses, if it is sound.
     pub space: Option<Arc<Space>>,
@@ -40,7 +40,7 @@ pub struct Loaded {
     pub scenario: Option<Scenario>,
     /// The policy of the root, if it has one and it is sound.
     pub policy: Option<Policy>,
-    /// What was found of the rows of the root. A scenario or a policy claims nothing of its space.
+    /// The findings about the rows of the root. A scenario or a policy claims nothing of its space.
     pub runs: Runs,
 }
 
@@ -83,8 +83,8 @@ pub struct MapCache {
     routes: Vec<(Arc<RoadMap>, [LanePlace; 2], Route)>,
 }
 
-/// Spaces that scenarios and policies used before, for a caller that loads many of them: each space is read and checked once. As
-/// long as this lives, only the files that are loaded themselves may change.
+/// Spaces that scenarios and policies used before, for a caller that loads many of them: each space is read and checked
+/// once. As long as this lives, only the files that are loaded themselves may change.
 #[derive(Debug, Default)]
 pub struct KnownSpaces {
     maps: MapCache,
@@ -104,7 +104,7 @@ struct KnownFile {
     diagnostics: Vec<Diagnostic>,
 }
 
-/// What the files of a space give, whatever scenario or policy uses it.
+/// The result of reading the files of a space, whatever scenario or policy uses it.
 #[derive(Debug, Clone)]
 struct KnownSpace {
     space: Option<Arc<Space>>,
@@ -266,15 +266,15 @@ pub fn files_used(root: &Path, read: &ReadFile<'_>) -> Vec<PathBuf> {
     files.into_iter().map(|file| file.path).collect()
 }
 
-/// Whether a file is a space of its own.
+/// Whether a file makes a new space.
 fn declares(file: &LoadedFile) -> bool {
     let declares = |item: &ast::Item| match &item.kind {
         ItemKind::Language(_) | ItemKind::Scenario(_) | ItemKind::Policy(_) => false,
-        // A `use` that leaves something out makes a space of its own.
+        // A `use` with `without` makes a new space.
         ItemKind::Use(used) => !used.without.is_empty(),
         _ => true,
     };
-    // A file that uses several others is a space of its own, which none of them is.
+    // A file that uses several others makes a new space, too.
     uses(file).count() > 1 || file.tree.items.iter().any(declares)
 }
 
@@ -305,7 +305,7 @@ fn check_digests(maps: &mut MapReader<'_>) -> Vec<Diagnostic> {
     for file in maps.files {
         for used in uses(file) {
             let Some(wanted) = &used.digest else { continue };
-            // What cannot be read is reported where it is named.
+            // An unreadable file is reported where it is named.
             let Some(found) = maps.meaning(&used_path(file, used)) else { continue };
             if found.is_sealed_by(&wanted.value) {
                 continue;
@@ -433,7 +433,7 @@ struct MapReader<'a> {
     read: &'a ReadFile<'a>,
     files: &'a [LoadedFile],
     texts: BTreeMap<PathBuf, Result<MapText, ReadError>>,
-    /// What files mean, as far as it was asked.
+    /// The meanings of files found so far.
     meanings: BTreeMap<PathBuf, Option<Meaning>>,
     cache: &'a mut MapCache,
 }
@@ -478,7 +478,7 @@ impl MapReader<'_> {
         cache.known.extend(open.into_iter().map(|(key, _)| key).zip(parsed));
     }
 
-    /// What a file means with all that it uses, as far as all could be read.
+    /// The meaning of a file with all files that it uses, as far as all could be read.
     fn meaning(&mut self, path: &Path) -> Option<Meaning> {
         if let Some(known) = self.meanings.get(path) {
             return known.clone();
@@ -511,7 +511,7 @@ impl Maps for MapReader<'_> {
             return Ok(route.clone());
         }
         let route = Route::find(map, start, goal)?;
-        // A map with a limit of its own is made anew at each load, so its routes are not found again.
+        // A map with its own limit is made anew at each load, so its routes are not found again.
         if known.values().flatten().any(|of| Arc::ptr_eq(of, map)) {
             if routes.len() >= ROUTES_MAX {
                 routes.clear();

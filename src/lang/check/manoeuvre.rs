@@ -26,7 +26,7 @@ const PHASES_MAX: usize = 100;
 /// Most manoeuvres that hand over one to another.
 const HAND_OVERS_MAX: usize = 100;
 
-/// Of more that lead to no end not each is told.
+/// Above this many manoeuvres that lead to no end, one message stands for all.
 const CIRCLES_MAX: usize = 100;
 
 impl Checker {
@@ -86,7 +86,7 @@ impl Checker {
             }
             found.contains(&to)
         };
-        // What is left is part of a circle, leads to one, or hands over too often.
+        // Each manoeuvre left is part of a circle, leads to a circle, or hands over too often.
         let left: Vec<usize> = (0..declared.len()).filter(|index| !has_come[*index]).collect();
         if let Some(first) = left.first().filter(|_| left.len() > CIRCLES_MAX) {
             let message = format!("{} manoeuvres hand over more than {HAND_OVERS_MAX} times", left.len());
@@ -248,7 +248,7 @@ impl Checker {
         Some(PhaseDef { once, held, within, after, only_if, command, then: as_written(then)? })
     }
 
-    /// Reports a figure of a phase that is written out, out of its bounds. What is computed is brought into them later.
+    /// Reports a written-out figure of a phase that is out of its bounds. A computed figure is brought into them later.
     fn check_figure(&mut self, expr: &Expr, name: &str, unit: &str, bounds: &RangeInclusive<f64>) {
         if self.written_out(expr).is_some_and(|value| !bounds.contains(&value)) {
             let message = format!("the `{name}` of a phase lies out of bounds");
@@ -269,7 +269,7 @@ impl Checker {
         Some(value.to_f64())
     }
 
-    /// What the phases of a manoeuvre tell; nothing, if it is broken.
+    /// The fields that the phases of a manoeuvre tell; none, if it is broken.
     pub(super) fn told(&self, manoeuvre: usize) -> Told {
         told(manoeuvre, |index| self.manoeuvres.get(index)?.as_ref())
     }

@@ -1,9 +1,9 @@
-//! What the digest of a file covers: what its declarations say, and those of every file that it uses.
+//! The content that the digest of a file covers: its own declarations, and the declarations of every file that it uses.
 //!
-//! Covered are the declarations that stand (overridden ones replaced, those of `use … without` left out), each as
-//! the formatter prints it, and the bytes of every map. Not covered are comments, documentation, line breaks, claims
-//! (`expect`), how the declarations are spread over files, and the names of files and maps. So a suite of scenarios
-//! lives on when somebody documents or tidies the space.
+//! Covered are the declarations in force, each as the formatter prints it, and the bytes of every map. An `override`
+//! replaces a declaration, and `use … without` leaves it out. Not covered are comments, documentation, line breaks, claims
+//! (`expect`), how the declarations are spread over files, and the names of files and maps. So a suite of scenarios stays
+//! valid when an author documents or tidies the space.
 //!
 //! Rows are numbered in the order of the actions, states are drawn in theirs, roads are driven in theirs, and the
 //! first rule that refuses an action gives the reason. So their order is covered. That of enums, odds, constants,

@@ -47,8 +47,8 @@ fn insertion(tree: &File) -> Span {
 /// Stands in [`meant_by`] for the variants of an enum, which no keyword declares.
 const VARIANT: &str = "variant";
 
-/// The keywords of the declarations that an author can have meant by the unknown name in a message. For example, a name in an
-/// expression cannot be an action, and no declaration adds a field to a spawn.
+/// The keywords of the declarations that an author can have meant by the unknown name in a message. For example, a name in
+/// an expression cannot be an action, and no declaration adds a field to a spawn.
 fn meant_by(message: &str) -> &'static [&'static str] {
     let kind = message.strip_prefix("unknown ").and_then(|rest| rest.split_once(" `")).map(|(kind, _)| kind);
     match kind {

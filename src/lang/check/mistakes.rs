@@ -1,4 +1,4 @@
-//! What every check shares: reporting a mistake and going on, and reading the fields of a block.
+//! Helpers of every check: reporting a mistake and going on, and reading the fields of a block.
 
 use crate::check::names::{Names, unknown};
 use crate::model::code;
@@ -66,7 +66,7 @@ pub(super) trait Report {
         known
     }
 
-    /// The slot of an argument: that of its name, else that of its position. Reports an argument without one, and one
+    /// The slot of an argument: by its name, else by its position. Reports an argument without a slot, and an argument
     /// whose slot is `given` already.
     fn slot(
         &mut self,
@@ -117,7 +117,7 @@ pub(super) fn all_of<T>(found: impl Iterator<Item = Option<T>>) -> Option<Vec<T>
     found.into_iter().collect()
 }
 
-/// What was written, or nothing where nothing was; `None` if it is broken.
+/// The written value, or nothing where the file has none; `None` if it is broken.
 pub(super) fn as_written<T>(found: Option<Option<T>>) -> Option<Option<T>> {
     match found {
         Some(found) => found.map(Some),

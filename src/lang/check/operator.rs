@@ -363,7 +363,7 @@ pub(super) fn with_range(error: Diagnostic, expr: &ast::Expr) -> Diagnostic {
     }
 }
 
-/// What `==` gives, or its opposite for `!=`.
+/// The result of `==`, or its opposite for `!=`.
 fn equal_or_not(op: Comparison, is_so: Expr) -> Expr {
     match op {
         Comparison::NotEqual => {

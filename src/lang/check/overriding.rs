@@ -204,7 +204,8 @@ fn keeps_something(
     is_kept
 }
 
-/// What decides which actions a rule without `on` binds: the states that steps set, and the gaps if an action spawns.
+/// The names that decide which actions a rule without `on` binds: the states that steps set, and the gaps if an action
+/// spawns.
 fn touched<'a>(items: impl Iterator<Item = &'a Item>) -> BTreeSet<String> {
     let effects = items.flat_map(|item| match item.kind.plain() {
         ItemKind::Action(action) => action.effects.as_slice(),

@@ -1,9 +1,9 @@
-//! What the names of the loaded files stand for: where each thing is declared, and where it is used.
+//! The meaning of every name in the loaded files: where each thing is declared, and where it is used.
 //!
-//! [`References::declared`] notes the declarations of all files, overridden ones and ones that are left out
-//! included. The checker then notes every use in a space at the place where it resolves the name; the uses in
-//! scenarios and policies are noted by a pass of their own (`scenario_names`), because their readers do not
-//! run on a broken space. The editor's server reads the record and resolves nothing itself.
+//! [`References::declared`] notes the declarations of all files, including those that are overridden or left out. The
+//! checker then notes every use in a space at the place where it resolves the name. A separate pass (`scenario_names`)
+//! notes the uses in scenarios and policies, because their readers do not run on a broken space. The editor's server reads
+//! the record and resolves nothing itself.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -18,8 +18,8 @@ use crate::syntax::{Sources, ast};
 /// Largest number of parameters of an action or a function.
 pub(super) const PARAMETERS_MAX: usize = 100;
 
-/// What a name stands for. Two declarations of one kind and name are one symbol: an `override` and what it
-/// replaces are renamed together.
+/// The thing that a name stands for. Two declarations of one kind and name are one symbol: an `override` and the
+/// declaration it replaces are renamed together.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Symbol {
     File(PathBuf),
@@ -65,7 +65,7 @@ pub struct Occurrence {
     pub declares: bool,
 }
 
-/// What is known of a declared symbol.
+/// The known facts of a declared symbol.
 #[derive(Debug, Clone)]
 pub struct Declaration {
     /// The whole declaration, `override` included.
@@ -87,7 +87,7 @@ pub struct Declaration {
 #[derive(Debug, Clone, Default)]
 pub struct References {
     declarations: BTreeMap<Symbol, Declaration>,
-    /// What is noted while the checker works, by the spans of expressions.
+    /// Notes from the running checker, by the spans of expressions.
     notes: BTreeMap<Span, Occurrence>,
     /// The same once the checker is done, by the spans of names, in the order of files and texts.
     occurrences: Vec<Occurrence>,
@@ -275,7 +275,7 @@ impl Symbol {
     }
 }
 
-/// What the checker notes.
+/// Notes made by the checker.
 impl References {
     /// All that the files declare, and the files that they name.
     pub(super) fn declared(files: &[LoadedFile]) -> References {

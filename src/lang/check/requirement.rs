@@ -101,7 +101,7 @@ impl Checker {
         let mut bearers: Vec<usize> = all().flat_map(|expr| expr.bearers(0)).collect();
         bearers.sort_unstable();
         bearers.dedup();
-        // Who asks `truck.there` wants an answer while it is not there, too.
+        // A requirement that reads `truck.there` needs an answer while the truck is absent, too.
         let is_needed = |who: &usize| {
             let asks = |kind: &ExprKind| matches!(kind, ExprKind::IsThere(of) if of.bearers(0).contains(who));
             !all().any(|expr| expr.any(asks))
@@ -187,8 +187,8 @@ impl Checker {
         ))
     }
 
-    /// `recently(npc.gap <= 5 m, 2 s)`: whether a condition held at some moment of the last seconds, or at each of them, how
-    /// long in all and how often; or by how much a number has changed.
+    /// `recently(npc.gap <= 5 m, 2 s)`: whether a condition held at some moment of the last seconds, or at each of them.
+    /// Also how long in all and how often, or by how much a number has changed.
     pub(super) fn past(&mut self, word: PastWord, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
         let name = word.name();
         self.references.note(call.name.span, Symbol::Engine(name, word.meaning()), false);

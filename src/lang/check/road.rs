@@ -304,8 +304,8 @@ impl Checker {
     }
 }
 
-/// A copy of the map in which no lane allows more than the limit; lower limits of the map stay, and where it states none, the limit
-/// counts. It is stored in the lanes because driving systems read it there.
+/// A copy of the map in which no lane allows more than the limit; lower limits of the map stay, and where it states none,
+/// the limit counts. It is stored in the lanes because driving systems read it there.
 fn slowed(map: &RoadMap, limit_mps: f64) -> Arc<RoadMap> {
     let mut map = map.clone();
     for lane in &mut map.lanes {

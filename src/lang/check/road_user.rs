@@ -1,4 +1,4 @@
-//! Names of road users: what spawns call them, and who is meant where one is asked for, ordered or named by a parameter.
+//! Names of road users: the names that spawns give, and the road user that a question, an order or a parameter means.
 
 use crate::check::checker::{Checker, each};
 use crate::check::expression::Place;

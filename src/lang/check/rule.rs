@@ -151,7 +151,7 @@ impl Checker {
             false => self.all_targets(on),
         };
         actions.sort_unstable();
-        // Why a broken action gives it to nobody was reported where that stands.
+        // If an action is broken, its own message already says why it gives the manoeuvre to no road user.
         let is_whole = |action: &&usize| !self.half_broken.contains(action);
         let mut whole = actions.iter().filter(is_whole).filter_map(|action| self.actions[*action].as_ref());
         if !on.is_empty()
@@ -281,7 +281,7 @@ impl Checker {
         let read: BTreeSet<usize> = states_read(&compiled, &self.states).into_iter().collect();
         let (known, reads_memory) = (compiled.known(), compiled.reads_memory());
         let each_step = known != Known::Spawn && self.each_step.iter().any(|set| read.contains(&set.state));
-        // What time may break has to be kept by every action.
+        // A condition that time may break has to be kept by every action.
         let timed = compiled.is_known_at_start() && compiled.asks_the_world();
         let open = each_step || timed || known != Known::Spawn && !reads_memory;
         let mut bound: BTreeSet<usize> = match open {

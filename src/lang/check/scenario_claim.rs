@@ -1,4 +1,4 @@
-//! What a scenario claims of its replay: `expect collision with npc#2 at 14.22 s`, `expect end == arrived`.
+//! The claims of a scenario about its replay: `expect collision with npc#2 at 14.22 s`, `expect end == arrived`.
 
 use crate::check::mistakes::Report;
 use crate::check::names::unknown;

@@ -1,7 +1,7 @@
 //! The names in scenarios and policies.
 //!
-//! Every place in them takes one kind of name and literal values only, so the names are known from the
-//! declarations alone: a scenario over a broken space, or a policy with a broken seal, has them all the same.
+//! Every place in them takes one kind of name and literal values only, so the names are known from the declarations alone.
+//! A scenario over a broken space, or a policy with a broken seal, has them all the same.
 
 use crate::check::expression::enum_of;
 use crate::check::references::{References, Symbol};

@@ -30,14 +30,14 @@ pub(super) struct Moment<'a> {
     pub road: Option<usize>,
 }
 
-/// One error for each rule in force that the step breaks. What the world would answer is not known here,
-/// so that a rule that asks it holds.
+/// One error for each rule in force that the step breaks. The answers of the world are not known here, so a rule that asks
+/// the world holds.
 pub(super) fn breaches(space: &Space, moment: &Moment<'_>, in_force: &RulesInForce) -> Vec<Diagnostic> {
     let road = moment.road.map(|road| &space.roads[road].facts);
     let rules = RowRules { space, row: moment.row, road, in_force };
     let (_, before) = moment.history.last().expect("it begins with the start");
     let candidate = Candidate { values: moment.locals, before, after: moment.after, world: None };
-    // What the moment decides is judged when the scenario is played.
+    // Conditions on facts of the moment are judged when the scenario is played.
     let of_the_moment = space.cells_of_the_moment();
     let error = |breach: Breach<'_>| {
         if !of_the_moment.is_empty() && is_about(space, &breach, &of_the_moment) {

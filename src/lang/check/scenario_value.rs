@@ -88,8 +88,8 @@ fn decimals(digits: &str) -> usize {
     fraction.saturating_sub(exponent).clamp(0, DECIMALS_MAX as i64) as usize
 }
 
-/// The number of a literal in a unit of its own, which is given by its factor to SI. `what` begins the complaint
-/// about another dimension: "wanted", or what has the dimension.
+/// The number of a literal in its own unit, given by its factor to SI. `what` begins the complaint about another dimension:
+/// "wanted", or the thing that has the dimension.
 ///
 /// # Errors
 /// If its unit is unknown or of another dimension, or if it is too large.

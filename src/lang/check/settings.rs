@@ -229,7 +229,7 @@ fn counted() -> VerdictDef {
     VerdictDef { name: COUNTED.to_owned(), docs: Vec::new(), condition, clauses }
 }
 
-/// What a condition joins by `and`, from left to right.
+/// The conditions that `and` joins, from left to right.
 fn clauses(condition: &ast::Expr) -> Vec<&ast::Expr> {
     match &condition.kind {
         ast::ExprKind::Binary { op: BinaryOp::And, left, right, .. } => {

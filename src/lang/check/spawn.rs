@@ -1,4 +1,4 @@
-//! What appears: road users, rows of them, where they begin and what they do.
+//! Spawns: road users, rows of them, where they begin and what they do.
 
 use crate::check::checker::Checker;
 use crate::check::expression::Place;
@@ -25,8 +25,8 @@ const fn idle(field: Field, is_idle: fn(Verb) -> bool, what: &'static str, help:
     IdleField { field, is_idle, what, help }
 }
 
-/// Fields that mean nothing to some verbs, each for a reason of its own. Of the others, nobody has a use for what it can never be
-/// told.
+/// Fields that mean nothing to some verbs, each for a reason of its own. Any other field is useless to a road user that can
+/// never be told it.
 const IDLE_FIELDS: [IdleField; 6] = {
     const FOLLOWS: fn(Verb) -> bool = |verb| verb == Verb::Follow;
     const WALKS: fn(Verb) -> bool = |verb| verb == Verb::Walk;
@@ -48,7 +48,7 @@ const IDLE_FIELDS: [IdleField; 6] = {
     ]
 };
 
-/// Whether nobody who does that can ever be told this: `what` and a help in words.
+/// Whether a road user with this verb can never be told this field: `what` and a help in words.
 fn never_told(field: Field, verb: Verb) -> Option<(String, String)> {
     let is_checked = matches!(field.kind(), Kind::Own) || IDLE_FIELDS.iter().any(|idle| idle.field == field);
     if is_checked || field == Field::Speed || Told::to(verb).holds(field) {
@@ -60,7 +60,7 @@ fn never_told(field: Field, verb: Verb) -> Option<(String, String)> {
 }
 
 impl Checker {
-    /// What one `spawn` makes appear: a road user, or several if it is a row.
+    /// Reads one `spawn`: a road user, or several if it is a row.
     pub(super) fn spawns(
         &mut self,
         spawn: &ast::Spawn,
@@ -118,7 +118,7 @@ impl Checker {
         self.bearers.iter().position(|one| *one == name.text)
     }
 
-    /// Reports places beside somebody whom the same action makes appear: nobody of that name is there when places are found.
+    /// Reports places beside a road user that the same action spawns: it does not exist yet when places are found.
     pub(super) fn check_beside(&mut self, effects: &[ast::Effect]) {
         let spawns = || effects.iter().filter_map(ast::Effect::spawn);
         let own =
@@ -162,7 +162,7 @@ impl Checker {
         found
     }
 
-    /// What `spawn` says of one road user by itself, without its name and whom it stands beside.
+    /// Reads one road user of `spawn` alone, without its name and the road user it stands beside.
     fn spawn(&mut self, spawn: &ast::Spawn, place: &Place<'_>, span: Span) -> Option<SpawnDef> {
         let ast::Spawn { body, place: begins, distance, of, fields, .. } = spawn;
         let among = Field::of_spawns();
@@ -250,9 +250,9 @@ impl Checker {
         })
     }
 
-    /// Reports who follows a trajectory without one, who has one and does something else, and a place that is none on a way: a
-    /// station counts `at` one of a map, a distance `ahead` or `behind` on one beside the ego vehicle's route. `ways` are those
-    /// that the trajectory may be, and whether the place is a station.
+    /// Reports `Follow` without a trajectory, a trajectory with another verb, and a place off the trajectory. A station
+    /// counts `at` one of a map, a distance `ahead` or `behind` on one beside the ego vehicle's route. `ways` are the
+    /// possible trajectories, and whether the place is a station.
     fn check_trajectory(
         &mut self,
         is_on: bool,
@@ -315,7 +315,7 @@ impl Checker {
         self.check_place_fields(fields, &verbs);
     }
 
-    /// Reports a manoeuvre that tells somebody what it cannot be told: the first reason alone.
+    /// Reports a manoeuvre with a field that its road user cannot be told: the first reason alone.
     fn check_given(&mut self, given: &ManoeuvreCall, verb: &WordExpr<Verb>, span: Span) {
         let has = |is_so: fn(&CommandDef) -> bool| self.has_command(given.manoeuvre, is_so);
         let keeps = has(|command| command.says(Field::Keep));
@@ -378,7 +378,7 @@ impl Checker {
         let [cross, walk, stand] = [Verb::CrossRoad, Verb::Walk, Verb::Stand];
         for (wanted, of) in [(Field::Lane, [ahead, behind, overtake]), (Field::Side, [cross, walk, stand])] {
             let Some(value) = field(fields, wanted) else { continue };
-            // Of a trajectory it is said elsewhere.
+            // Another check reports both fields with `Follow`.
             let means_nothing = verbs.iter().all(|verb| !of.contains(verb) && *verb != Verb::Follow);
             if let Some(verb) = verbs.first().filter(|_| means_nothing) {
                 let message = format!("a `{}` means nothing to `{}`", wanted.name(), verb.name());

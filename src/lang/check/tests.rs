@@ -1,4 +1,4 @@
-//! What a checked file becomes. What the checker says of a broken one is tested by `tests/cases/diagnostics`.
+//! The result of checking a file. `tests/cases/diagnostics` tests the messages about broken files.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -68,7 +68,7 @@ fn action(space: &Space, name: &str) -> usize {
     space.actions.iter().position(|action| action.name == name).expect("it is declared")
 }
 
-/// What a function of one number gives.
+/// The result of a function of one number.
 fn called(space: &Space, function: &str, argument: f64) -> f64 {
     let function = space.functions.iter().find(|known| known.name == function).expect("it is declared");
     let locals = [Value::Number(argument)];
@@ -326,7 +326,8 @@ rule not_too_often on more: count <= 2
     assert_eq!(memory.cells()[cell(&space, "count")], Value::Number(1.0));
 }
 
-/// Rows share a proof if the values that decide it are equal: `copy` decides nothing, `time` only what a rule sees after the step.
+/// Rows share a proof if the values that decide it are equal: `copy` decides nothing, `time` only what a rule sees after
+/// the step.
 #[test]
 fn a_row_that_shares_a_proof_has_its_own() {
     let text = format!(
@@ -608,7 +609,8 @@ rule early: elapsed >= 12 s or dark
     }
 }
 
-/// Red breaks the rule, and is drawn in 16 of 20 episodes. Of those, and of all, one in four has to begin Green.
+/// Red breaks the rule, and is drawn in 16 of 20 episodes. One in four of those, and one in four of all, has to begin
+/// Green.
 #[test]
 fn what_is_drawn_again_keeps_its_odds() {
     let space = space_of(&based(
@@ -707,7 +709,7 @@ reward {
     let motorcycle = BodyWord::engine(Body::Motorcycle);
     assert_eq!(reward(None, Some(scooter)), 3.0);
     assert_eq!(reward(None, Some(motorcycle)), 0.0);
-    // What is like a motorcycle is one.
+    // A body that is like a motorcycle is one.
     assert_eq!(reward(Some(scooter), None), 2.0);
     assert_eq!(reward(Some(motorcycle), None), 2.0);
     assert_eq!(reward(Some(BodyWord::engine(Body::SUV)), None), 0.0);

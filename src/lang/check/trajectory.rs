@@ -62,7 +62,8 @@ impl Checker {
         self.word_or_enum("trajectory", expr, place, known, note)
     }
 
-    /// Lays every trajectory on the map of its road, and gives it to all roads on that map. `roads` may lack those with mistakes.
+    /// Lays every trajectory on the map of its road, and gives it to all roads on that map. `roads` may lack those with
+    /// mistakes.
     pub(super) fn lay_trajectories(&mut self, roads: &mut [Option<Road>], maps: &mut dyn Maps) {
         for definition in self.trajectories.clone() {
             if definition.is_beside_route() {
@@ -124,7 +125,7 @@ impl Checker {
         let road_name = self.name_of(road, "a road")?;
         let Some(road) = roads.iter().flatten().find(|known| known.name == road_name) else {
             if self.announced.roads.iter().any(|known| known == road_name) {
-                // It has a mistake of its own.
+                // The broken road has its own message.
                 return None;
             }
             let names = self.announced.roads.iter().map(String::as_str);

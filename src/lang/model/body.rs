@@ -4,7 +4,8 @@
 //! and the bus brake better than FMVSS 121 demands on average (3.8 and 4.2 m/s²). Wheelbases are those of a
 //! typical sedan (2.80 m), Golf, SUV, four-door Wrangler, 16 to 20 ft box truck and American school bus of
 //! type C. The rear overhangs are ours, about 0.6 of what the wheelbase leaves of the length. A motorcycle is one of
-//! 125 to 500 cm³ and a bicycle one of 28 inches, both with their riders. The animal is a deer, the object a box of goods; ours.
+//! 125 to 500 cm³ and a bicycle one of 28 inches, both with their riders. The animal is a deer, the object a box of goods;
+//! ours.
 
 use crate::model::vocabulary::Body;
 
@@ -16,7 +17,7 @@ pub struct OwnBody {
     pub shape: BodyParameters,
 }
 
-/// What a spawn calls a body: one of the engine, or one of the author's own that is like it.
+/// The body that a spawn names: a body of the engine, or a declared body that is like one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BodyWord {
     pub like: Body,
@@ -37,7 +38,7 @@ impl BodyWord {
     }
 }
 
-/// What a body is and can do on a dry road.
+/// The size of a body and its abilities on a dry road.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodyParameters {
     pub length_m: f64,
@@ -53,10 +54,10 @@ pub struct BodyParameters {
     pub deceleration_mps2_max: f64,
 }
 
-/// The part of the length beside the wheelbase that lies behind the rear axle, where a body of one's own says no more.
+/// The default share of the length beside the wheelbase that lies behind the rear axle, for a declared body.
 pub const REAR_PART: f64 = 0.6;
 
-/// What a body of one's own says of itself; the rest is as in the body that it is like.
+/// The values that a declared body changes; the other values are those of the body that it is like.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Changes {
     pub length_m: Option<f64>,

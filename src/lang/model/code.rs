@@ -28,7 +28,7 @@ pub const UNUSED: &str = "AV0111";
 pub const OVERRIDE: &str = "AV0112";
 /// A space that is too large to be checked.
 pub const TOO_MUCH: &str = "AV0113";
-/// What the map has on a route and drivers do not know: slopes, solid objects in a lane.
+/// Features of the map on a route that drivers do not know: slopes, solid objects in a lane.
 pub const NOT_DRIVEN: &str = "AV0114";
 
 // Types and units.

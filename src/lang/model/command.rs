@@ -1,5 +1,5 @@
-//! What a road user is told by an order or a phase: how fast it goes, and a vehicle where to the side, how near to others, in
-//! which manner, and where at the next junction. All of it runs together.
+//! The fields of an order or a phase for a road user. All road users have a speed; vehicles also a lateral offset, a gap to
+//! others, manners, and a turn at the next junction. All of them run together.
 
 use core::ops::RangeInclusive;
 
@@ -11,7 +11,7 @@ use crate::model::field::{BACK_MPS_MAX, Fields, ON_FOOT_MPS_MAX, Said, Term};
 use crate::model::limits::SPEED_MPS_MAX;
 use crate::model::vocabulary::{Field, Verb, Word};
 
-/// What a road user is told: fields of an order. Not everybody can be told all of them.
+/// A set of fields of an order. Not every road user can be told all of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Told(u32);
 
@@ -30,7 +30,7 @@ impl Told {
         Told(bits)
     }
 
-    /// What can be told to who does that.
+    /// The fields that a road user with this verb can be told.
     pub fn to(verb: Verb) -> Told {
         use Field::{Aside, At, Continuous, Early, Lights, Offset, Rate, Reach, Speed, Steady};
         match verb {
@@ -75,7 +75,7 @@ impl Told {
         }
     }
 
-    /// Why somebody who does that cannot be told this, in words; `None` if they can.
+    /// Why a road user with this verb cannot be told this, in words; `None` if it can.
     pub fn lacked_by(self, verb: Verb) -> Option<String> {
         let can = Told::to(verb);
         (!can.covers(self)).then(|| {
@@ -89,7 +89,7 @@ impl Told {
     }
 }
 
-/// How somebody moves, which decides how fast they can be told to be.
+/// How a road user moves, which decides the speeds that it can be told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Moves {
     Drives,
@@ -108,7 +108,8 @@ impl Moves {
         }
     }
 
-    /// Of somebody who can be told this; who may be one of several has the widest range.
+    /// The kind of motion of a road user that can be told these fields. If it may be one of several, it gets the widest
+    /// range.
     pub(crate) fn told(can: Told) -> Moves {
         match () {
             () if can.holds(Field::Reach) => Moves::Follows,
@@ -127,13 +128,13 @@ impl Moves {
     }
 }
 
-/// What an order or a phase tells, as the file writes it.
+/// The fields of an order or a phase, as the file writes them.
 pub type CommandDef = Fields<Term>;
 
-/// What a road user is told. What is not said stays as it is.
+/// An order to a road user. A field that is not said stays as it is.
 pub type Command = Fields<Said>;
 
-/// How somebody moves to the side: by the smooth step of least jerk.
+/// How a road user moves laterally: by the smooth step of least jerk.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum AsideBy {
     /// With this greatest speed, m/s.
@@ -171,7 +172,7 @@ impl<T> Fields<T> {
 }
 
 impl Command {
-    /// The same for somebody who moves so: the nearest speed that it can be told.
+    /// The same for a road user that moves so: the nearest speed that it can be told.
     pub fn for_who(self, moves: Moves) -> Command {
         let speeds_mps = moves.speeds_mps();
         match self.speed_mps() {
@@ -180,7 +181,7 @@ impl Command {
         }
     }
 
-    /// Why nobody of that kind can be told this, in words; `None` if they can.
+    /// Why a road user with this verb cannot be told this, in words; `None` if it can.
     pub fn impossible(&self, verb: Verb) -> Option<String> {
         let moves = Moves::of(verb);
         let is_out = |mps: f64| !moves.speeds_mps().contains(&mps);

@@ -2,9 +2,9 @@
 //!
 //! Rows, roads, rules, states and the operations of conditions multiply, so a short text can ask for endless proofs. Each
 //! proof counts its steps ([`spend`]), and the checker limits all proofs together ([`within`]). Once the steps are spent,
-//! loops end early ([`is_spent`]); the checker then drops what they found and says that the space is too large. Steps are
-//! counted because a count is the same on every machine and a clock is not. Outside `within`, as in an episode, there is
-//! no limit.
+//! loops end early ([`is_spent`]). The checker then drops their results and says that the space is too large. Steps are
+//! counted because a count is the same on every machine and a clock is not. Outside `within`, as in an episode, there is no
+//! limit.
 
 use core::cell::Cell;
 

@@ -1,7 +1,7 @@
 //! The one evaluator of expressions: it computes rules, functions and verdicts in `f64`.
 //!
-//! Evaluation cannot fail: the checker has resolved names and types, functions cannot recurse, and what has no
-//! value (a division by 0, a number too large) is NaN, which satisfies no comparison but `!=`.
+//! Evaluation cannot fail: the checker has resolved names and types, and functions cannot recurse. A missing value (a
+//! division by 0, a number too large) is NaN, which satisfies no comparison but `!=`.
 
 use crate::model::effort;
 use crate::model::expr::{Comparison, Expr, ExprKind, FnDef, Who, WordExpr};
@@ -36,7 +36,7 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
             // As near as `elapsed` to the exact time.
             ((world.moment.elapsed_s - last_s) * 1000.0).round().min(SINCE_S_MAX * 1000.0) / 1000.0
         })),
-        // What was, only requirements remember.
+        // Only requirements remember the past.
         ExprKind::Past(_, PastWord::Change | PastWord::Total | PastWord::Times, _) => Value::Number(0.0),
         ExprKind::Past(condition, ..) => evaluate(condition, functions, facts),
         ExprKind::Near(word, bodies, condition) => {

@@ -82,11 +82,11 @@ pub enum ExprKind {
     IsThere(Who),
     /// `since(vehicles)`: the time since one of these actions last happened, and how they are called.
     Since(Vec<usize>, String),
-    /// `recently(npc.gap <= 5 m, 2 s)`: whether it held at some tick of so many before, and at this one;
-    /// `throughout(…)`: whether it held at all of them; `change(ego.speed, 1 s)`: by how much it is more than so many ticks ago.
+    /// `recently(npc.gap <= 5 m, 2 s)`: whether it held at this tick or one of so many before. `throughout(…)`: whether it
+    /// held at all of them. `change(ego.speed, 1 s)`: by how much it is more than so many ticks ago.
     Past(Box<Expr>, PastWord, u32),
-    /// `some(Pedestrian, npc.gap <= 5 m)`: whether it holds of a road user near that has one of these bodies; of any, if there
-    /// is none.
+    /// `some(Pedestrian, npc.gap <= 5 m)`: whether it holds of a road user near that has one of these bodies; of any, if
+    /// there is none.
     Near(NearWord, Vec<BodyWord>, Box<Expr>),
     /// `stops_at_red.breached`: whether a requirement was breached in the step.
     Breached(usize),
@@ -152,7 +152,7 @@ impl ExprKind {
 }
 
 impl Expr {
-    /// What a condition joins by `and`, from left to right.
+    /// The conditions that `and` joins, from left to right.
     pub fn clauses(&self) -> Vec<&Expr> {
         match &self.kind {
             ExprKind::And(left, right) => left.clauses().into_iter().chain(right.clauses()).collect(),
@@ -225,7 +225,7 @@ impl Expr {
         }
     }
 
-    /// What `of` gives for the expression and the parts inside it, where it gives something.
+    /// The results of `of` for the expression and its parts, where there are any.
     pub fn filter_map<T>(&self, of: impl Fn(&ExprKind) -> Option<T>) -> Vec<T> {
         let mut found = Vec::new();
         self.walk(&mut |part| found.extend(of(&part.kind)));

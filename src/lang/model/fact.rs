@@ -1,7 +1,7 @@
 //! The facts: what an expression may ask about the world.
 //!
-//! A row has the spelling of a fact, its type, from when on it is known, where its value stands among what an expression may
-//! read, one sentence for people, and for numbers with bounds what they may be on any road and at any moment.
+//! A row has the spelling of a fact, its type, when it is known, and where an expression reads its value. It also has one
+//! sentence for people, and the range of a bounded number on any road and at any moment.
 
 use core::ops::RangeInclusive;
 
@@ -18,7 +18,7 @@ use avastra_base::units::Dimension;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
     Limit,
-    /// What the place on the route says, the limit included.
+    /// Facts of the place on the route, the limit included.
     Route,
     Crosswalks,
     /// How many others there are, and the nearest of them.
@@ -30,18 +30,18 @@ pub enum Part {
     OverLine,
     OverCrosswalk,
     OverOncoming,
-    /// Of the ego vehicle in its route's lane.
+    /// The ego vehicle in its route's lane.
     Lane,
     EgoOffRoad,
     Crosses,
     Jerk,
-    /// Of each road user near.
+    /// Facts of each road user near.
     LanesLeft,
     OffRoad,
     Encroachment,
 }
 
-/// Parts that somebody asks for.
+/// Parts that an expression asks for.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Parts(u32);
 
@@ -64,7 +64,7 @@ impl Parts {
     }
 }
 
-/// What stands where a fact is found.
+/// The value where a fact is found.
 trait FactValue: Copy {
     /// Where nothing is found.
     const MISSING: Value;
@@ -146,7 +146,7 @@ macro_rules! if_of {
     ($kind:ident, $other:ident, $($part:ident).+) => { None };
 }
 
-/// What a number may be without bounds.
+/// The range of a number without bounds.
 macro_rules! range {
     () => {
         f64::NEG_INFINITY..=f64::INFINITY
@@ -179,7 +179,7 @@ macro_rules! facts {
                 match self { $(Fact::$fact => Known::$known),+ }
             }
 
-            /// What it is looked up with; `None` if it costs nothing.
+            /// The part needed to look it up; `None` if it costs nothing.
             fn part(self) -> Option<Part> {
                 match self { $(Fact::$fact => part_of!($($of)?)),+ }
             }
@@ -189,17 +189,17 @@ macro_rules! facts {
                 match self { $(Fact::$fact => found_value(source!(facts, $source).map(|of| of.$($part).+))),+ }
             }
 
-            /// What a fact of the moment is; `None` for another one.
+            /// Reads a fact of the moment; `None` for another fact.
             pub(crate) fn of_moment(self) -> Option<fn(&MomentFacts) -> f64> {
                 match self { $(Fact::$fact => if_of!(moment, $source, $($part).+)),+ }
             }
 
-            /// What a fact that is watched at every tick is; `None` for another one.
+            /// Reads a fact that is watched at every tick; `None` for another fact.
             pub(crate) fn of_tick(self) -> Option<fn(&TickFacts) -> f64> {
                 match self { $(Fact::$fact => if_of!(tick, $source, $($part).+)),+ }
             }
 
-            /// What it may be, if it is a number, on any road and at any moment.
+            /// The range of a number on any road and at any moment.
             pub(crate) fn range(self) -> RangeInclusive<f64> {
                 match self { $(Fact::$fact => range!($($range)?)),+ }
             }
@@ -388,8 +388,8 @@ pub fn parts_of(thing: &str) -> Vec<(&'static str, &'static str)> {
     parts.filter(|((of, _), _)| *of == thing).map(|((_, part), meaning)| (part, meaning)).collect()
 }
 
-/// The facts of a road user that is named, or told by its number, each with its sentence: without those that are watched of each
-/// one near alone.
+/// The facts of a road user that is named, or told by its number, each with its sentence. Facts that are watched only for
+/// each road user near are left out.
 pub fn parts_of_named() -> Vec<(&'static str, &'static str)> {
     let is_watched =
         |part: &str| Fact::from_name(&format!("npc.{part}")).is_some_and(|fact| fact.known() == Known::Near);
@@ -397,7 +397,7 @@ pub fn parts_of_named() -> Vec<(&'static str, &'static str)> {
 }
 
 impl Site {
-    /// Whether a fact is known here. What a spawn asks for is known at the draw alone.
+    /// Whether a fact is known here. Gaps of a spawn are known at the draw alone.
     pub fn knows_fact(self, fact: Fact) -> bool {
         let is_of_spawn = matches!(fact, Fact::SpawnGap | Fact::SafetyGap);
         self.knows(fact.known())

@@ -1,4 +1,4 @@
-//! What an expression may read of a moment: of the road, the ego vehicle, others, a spawn and an outcome.
+//! The facts that an expression may read at a moment: of the road, the ego vehicle, others, a spawn and an outcome.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::model::on_route::Stretch;
 use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::{Crossing, LaneChoice, Light, Priority, RoadKind, Turn};
 
-/// What stands for a value that was not looked up.
+/// The placeholder for a value that was not looked up.
 pub trait Unknown {
     const UNKNOWN: Self;
 }
@@ -56,11 +56,11 @@ pub struct Facts<'a> {
     /// The spawn that the expression is about.
     pub spawn: Option<SpawnFacts>,
     pub outcome: OutcomeFacts,
-    /// Of each requirement the smallest margin of the step, NaN for one that was not asked.
+    /// The smallest margin of each requirement in the step, NaN for a requirement that was not asked.
     pub margins: &'a [f64],
 }
 
-/// What rules may ask the world at a draw ([`Known::World`] and later).
+/// The facts of the world that rules may ask at a draw ([`Known::World`] and later).
 ///
 /// [`Known::World`]: crate::model::vocabulary::Known::World
 #[derive(Debug, Clone, Default)]
@@ -76,7 +76,7 @@ pub struct WorldFacts {
     pub bearers: Vec<(usize, NpcFacts)>,
     /// Those near, if a requirement asks of them.
     pub near: Vec<NearFacts>,
-    /// What requirements alone may ask.
+    /// Facts for requirements alone.
     pub tick: TickFacts,
     /// When each action last happened, s since the episode began; empty if nothing asks for that.
     pub happened_s: Vec<f64>,
@@ -101,7 +101,7 @@ impl NearFacts {
 pub const LEAD_GAP_M_MAX: f64 = 1000.0;
 
 of_facts! {
-    /// What is watched over time for requirements ([`Known::Tick`]).
+    /// The facts watched over time for requirements ([`Known::Tick`]).
     ///
     /// [`Known::Tick`]: crate::model::vocabulary::Known::Tick
     pub struct TickFacts {
@@ -129,7 +129,7 @@ of_facts! {
 pub const SINCE_S_MAX: f64 = 1000.0;
 
 of_facts! {
-    /// What can be asked about the ego vehicle and its surroundings at a moment.
+    /// The facts of the ego vehicle and its surroundings at a moment.
     pub struct MomentFacts {
         pub ego_speed_mps: f64,
         pub ego_acceleration_mps2: f64,
@@ -140,7 +140,7 @@ of_facts! {
         /// The same to the end of that junction.
         pub ego_junction_end_m: f64,
         pub ego_crosswalk_ahead_m: f64,
-        /// Of the route's lane at the ego vehicle.
+        /// Width of the route's lane at the ego vehicle.
         pub ego_lane_width_m: f64,
         pub ego_route_left_m: f64,
         /// Positive to the left of the route.
@@ -179,7 +179,7 @@ impl LightTimes {
 pub const JUNCTION_AHEAD_M_MAX: f64 = 1000.0;
 
 of_facts! {
-    /// What can be asked about a road user other than the ego vehicle at a moment.
+    /// The facts of a road user other than the ego vehicle at a moment.
     pub struct NpcFacts {
         pub speed_mps: f64,
         /// Along its heading, negative when it brakes.
@@ -195,7 +195,7 @@ of_facts! {
         pub lane_left_m: f64,
         /// Limit of the lane that it is in.
         pub limit_mps: f64,
-        /// The next light on its way; none for who is on foot.
+        /// The next light on its way; none for a pedestrian.
         pub light: Light,
         pub light_times: LightTimes,
         /// Which of it and the ego vehicle goes first, since one of them came into the other's way.
@@ -222,21 +222,22 @@ of_facts! {
         pub next_crosswalk_gap_m: f64,
         /// Until the two touch, if both go on along and across the route as now, at most [`TIME_S_MAX`].
         pub contact_in_s: f64,
-        /// Since one of the two left the place where the other is, at most [`TIME_S_MAX`]. Known only to who watches.
+        /// Time since one of the two left the place where the other is, at most [`TIME_S_MAX`]. Known to requirements
+        /// alone.
         pub pet_s: f64,
         /// Where it is along the trajectory that it follows; 0 if it follows none.
         pub station_m: f64,
         pub has_siren: bool,
-        /// Whether it and another one than the ego vehicle have crashed into each other. Known only of who is there.
+        /// Whether it has crashed with a road user other than the ego vehicle. Known for a road user that is there.
         pub crashed: bool,
-        /// Whether it is the one ahead of the ego vehicle, in which lane to the left of that one's it is, and how far off the road, m:
-        /// known only to who watches.
+        /// Whether it is the road user ahead of the ego vehicle, how many lanes left of the ego vehicle's lane it is, and
+        /// how far off the road, m. Known to requirements alone.
         pub leads: bool,
         pub lanes_left: f64,
         pub off_road_m: f64,
         /// Whether it drives in the junction that is the next one of the ego vehicle's route.
         pub in_next_junction: bool,
-        /// Where it means to go at the next junction; nowhere for who is on foot.
+        /// Its intended turn at the next junction; none for a pedestrian.
         pub turn: Turn,
     }
 }
@@ -247,7 +248,7 @@ pub const CROSSWALK_GAP_M_MAX: f64 = 100.0;
 /// Stands for a time that is longer, and for one that does not come at all, s.
 pub const TIME_S_MAX: f64 = 100.0;
 
-/// What a rule may ask about a spawn before it happens.
+/// The facts that a rule may ask about a spawn before it happens.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpawnFacts {
     /// Distance between the outlines of the ego vehicle and the newcomer, or the vehicle that is parked with it,
@@ -270,11 +271,11 @@ pub struct OutcomeFacts {
     pub sudden: bool,
     /// The obstacle ran into the side or rear of an ego vehicle that did not have to give way.
     pub struck: bool,
-    /// Who had to give way. Known for collisions alone.
+    /// The road user that had to give way. Known for collisions alone.
     pub priority: Priority,
-    /// What was hit, if anything was.
+    /// The body that was hit, if any.
     pub hit: Option<BodyWord>,
-    /// What came nearest to a collision in the step, or was hit.
+    /// The body that was hit in the step, or came nearest to a collision.
     pub near: Option<BodyWord>,
     /// A careful reference driver would not have touched the obstacle. Known for judged collisions alone.
     pub avoidable: bool,
@@ -291,10 +292,10 @@ impl<'a> Facts<'a> {
     }
 }
 
-/// What rules may ask about a road.
+/// The facts that rules may ask about a road.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoadFacts {
-    /// What the road is called.
+    /// The name of the road.
     pub name: String,
     /// The lowest limit of the route's lanes: a drawn speed must be legal on the whole of it, SI.
     pub limit: Rational,

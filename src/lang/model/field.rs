@@ -1,7 +1,8 @@
-//! What a road user is told, by a `spawn`, an `order` or a phase of a manoeuvre: one table of fields for all three.
+//! The fields of a `spawn`, an `order` and a phase of a manoeuvre: one table for all three.
 //!
-//! A field is a word of [`Field`] with its sentence, an arm of [`Field::kind`], which says what may be written there, and a line of
-//! [`getters!`], by which the world reads it. To check, prove, evaluate, compare, print and complete fields are loops over this table.
+//! A field is a word of [`Field`] with its sentence, an arm of [`Field::kind`], which says what may be written there, and a
+//! line of [`getters!`], by which the world reads it. To check, prove, evaluate, compare, print and complete fields are
+//! loops over this table.
 
 use core::array;
 use core::ops::RangeInclusive;
@@ -13,13 +14,13 @@ use crate::model::limits::{OFFSET_M, SPEED_MPS_MAX, out_of_bounds, rounded_into}
 use crate::model::vocabulary::{Field, LaneChoice, ShownLights, TrafficRule, Turning, Word};
 use avastra_base::units::{Dimension, decimal};
 
-/// Nobody on foot is told to go faster, m/s: below a sprinter's 12 m/s.
+/// The greatest speed that a pedestrian can be told, m/s: below a sprinter's 12 m/s.
 pub(super) const ON_FOOT_MPS_MAX: f64 = 10.0;
 
-/// Nobody is told to go back faster, m/s.
+/// The greatest speed backwards that a road user can be told, m/s.
 pub(super) const BACK_MPS_MAX: f64 = ON_FOOT_MPS_MAX;
 
-/// Speeds that an order or a phase may name, m/s. What of it somebody does, [`Moves`] says.
+/// Speeds that an order or a phase may name, m/s. [`Moves`] says which of them a road user can do.
 ///
 /// [`Moves`]: crate::model::command::Moves
 const SPEED_MPS: RangeInclusive<f64> = -BACK_MPS_MAX..=SPEED_MPS_MAX;
@@ -45,10 +46,10 @@ const AT_M: RangeInclusive<f64> = 0.0..=1e6;
 /// How much before the ego vehicle a road user may be asked to be somewhere, s; below 0 after it.
 const EARLY_S: RangeInclusive<f64> = -30.0..=30.0;
 
-/// Times for which somebody may wait at the kerb, s.
+/// Times that a road user may wait at the kerb, s.
 const WAITS_S: RangeInclusive<f64> = 0.0..=600.0;
 
-/// Parts of the ego vehicle's front at which somebody may be met.
+/// Parts of the ego vehicle's front at which a road user may be met.
 const MEET: RangeInclusive<f64> = 0.0..=1.0;
 
 const OF_SPAWNS_ALONE: [Field; 6] =
@@ -59,7 +60,7 @@ const OF_ORDERS_ALONE: [Field; 9] = {
     [Rate, Continuous, Aside, TimeGap, Keep, To, At, Reach, Steady]
 };
 
-/// What may be written in a field.
+/// The kind of value that a field takes.
 pub enum Kind {
     /// A number in this unit, or in the second one.
     Figure(Unit, Option<Unit>),
@@ -69,7 +70,7 @@ pub enum Kind {
     Rules,
     /// The name of a road user.
     Who,
-    /// What only a `spawn` says, or another manoeuvre: `check` reads it by itself.
+    /// A field that only a `spawn` has, or another manoeuvre: `check` reads it separately.
     Own,
 }
 
@@ -83,7 +84,7 @@ pub struct Unit {
 /// The words of the engine that a field takes.
 #[derive(Clone, Copy)]
 pub struct WordKind {
-    /// What such a word is called in messages.
+    /// The name of such a word in messages.
     pub called: &'static str,
     /// Spellings and sentences, in the order of [`Word::ALL`].
     pub words: fn() -> Vec<(&'static str, &'static str)>,
@@ -150,11 +151,11 @@ impl Field {
     }
 }
 
-/// What is said in some fields; the others stay as they are.
+/// The values of some fields; the others stay as they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fields<T>([Option<T>; Field::ALL.len()]);
 
-/// What a field says, as the file writes it.
+/// The value of a field, as the file writes it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Term {
     /// In the first unit of the field, or in its second one.
@@ -313,16 +314,16 @@ impl Fields<Said> {
         })
     }
 
-    /// Why the world must not be told this, whatever the rules say; `None` if it may. NaN is out of bounds, too. `whose` is `spawn`
-    /// or `order`.
+    /// Why the world must not be told this, whatever the rules say; `None` if it may. NaN is out of bounds, too. `whose` is
+    /// `spawn` or `order`.
     pub fn out_of_bounds(&self, whose: &str) -> Option<String> {
         let figures =
             self.figures().map(|(field, value, unit)| (field.name(), value, unit.name, unit.bounds));
         out_of_bounds(whose, figures)
     }
 
-    /// Brings every figure into its range, and drops what goes without a value: a `rate`, an `aside`, a `time_gap`. `None` if
-    /// another figure has none.
+    /// Brings every figure into its range, and drops what goes without a value: a `rate`, an `aside`, a `time_gap`. `None`
+    /// if another figure has none.
     pub fn within_bounds(mut self) -> Option<Fields<Said>> {
         for (field, said) in Field::ALL.iter().zip(&mut self.0) {
             let Some(Said::Figure { value, second }) = said else { continue };

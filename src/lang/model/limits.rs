@@ -27,10 +27,10 @@ pub const EGO_ACCELERATION_MPS2_MAX: f64 = 10.0;
 /// Distances from the ego vehicle at which anything may be spawned, m.
 pub const SPAWN_DISTANCE_M: RangeInclusive<f64> = 0.0..=1000.0;
 
-/// Who drives ahead may begin beside the ego vehicle, in another lane: this far before its front at least, m.
+/// A vehicle with `DriveAhead` in another lane may begin beside the ego vehicle: this far before its front at least, m.
 const BESIDE_M: f64 = -30.0;
 
-/// How far away somebody may begin who does that, m.
+/// How far away a road user with this verb may begin, m.
 pub fn spawn_distance_m(verb: Verb) -> RangeInclusive<f64> {
     let least_m = if verb == Verb::DriveAhead { BESIDE_M } else { *SPAWN_DISTANCE_M.start() };
     least_m..=*SPAWN_DISTANCE_M.end()
@@ -67,8 +67,8 @@ pub fn rounded_into(figure: f64, bounds: RangeInclusive<f64>) -> f64 {
     }
 }
 
-/// Why the world must not be asked for a spawn at that speed and distance, whatever the rules say; `None` if it may. NaN is out of
-/// bounds, too.
+/// Why the world must not be asked for a spawn at that speed and distance, whatever the rules say; `None` if it may. NaN is
+/// out of bounds, too.
 pub fn spawn_out_of_bounds(verb: Verb, speed_mps: f64, distance_m: f64) -> Option<String> {
     let figures =
         [("speed", speed_mps, "m/s", SPAWN_SPEED_MPS), ("distance", distance_m, "m", spawn_distance_m(verb))];

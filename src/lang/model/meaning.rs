@@ -1,4 +1,4 @@
-//! What a space means, as digests: whether two files mean the same, and which declarations differ if not.
+//! The meaning of a space, as digests: whether two files mean the same, and which declarations differ if not.
 //!
 //! `check::meaning` says what a digest covers. Here are the digests, and the text that a `use` keeps of them.
 
@@ -31,8 +31,8 @@ impl Meaning {
         Meaning { digest: digest(whole.join("\n").as_bytes()), declarations }
     }
 
-    /// The title and the canonical text of each declaration. The digest is that of these texts in this order, so two
-    /// meanings have one digest if and only if they have the same texts in the same order.
+    /// The title and the canonical text of each declaration. The digest covers these texts in this order. Two meanings have
+    /// one digest if and only if they have the same texts in the same order.
     pub fn declarations(&self) -> impl Iterator<Item = (&str, &str)> {
         self.declarations.iter().map(|(title, text)| (title.as_str(), text.as_str()))
     }
@@ -42,7 +42,7 @@ impl Meaning {
         &self.digest
     }
 
-    /// What a file keeps of the space that it was made in: the digest, and after a blank the marks.
+    /// The record that a file keeps of the space it was made in: the digest, a blank, and the marks.
     pub fn seal(&self) -> String {
         format!("{} {}", self.digest, self.marks()).trim_end().to_owned()
     }

@@ -67,8 +67,8 @@ impl Space {
         self.states.iter().find(|state| state.name == name)
     }
 
-    /// What the memory says about the world: time of day, and levels of rain, fog and wetness. Without such
-    /// a state it is noon with a clear sky.
+    /// The weather in the memory: time of day, and levels of rain, fog and wetness. Without such a state it is noon with a
+    /// clear sky.
     pub fn weather(&self, memory: &Memory) -> (TimeOfDay, [Level; 3]) {
         let (mut time, mut sky) = (TimeOfDay::Noon, [Level::None; 3]);
         for state in &self.states {
@@ -120,9 +120,9 @@ impl Space {
         after
     }
 
-    /// The memory after a step without an action. If the effects of every step would break a rule in force that
-    /// stands for all states or orders their changes, or give a state no value, they do not happen. `step` is its number,
-    /// `world` the moment at which it begins; where there is none, what asks about it does not happen.
+    /// The memory after a step without an action. The effects of every step do not happen if they would break a rule in
+    /// force that stands for all states or orders their changes, or give a state no value. `step` is its number, `world`
+    /// the moment at which it begins. Without `world`, effects that ask about it do not happen.
     pub fn memory_after_wait(
         &self,
         before: &Memory,
@@ -182,15 +182,15 @@ impl Space {
         self.each_step.iter().flat_map(SetDef::parts).flat_map(|part| part.bearers(self.bearers.len()))
     }
 
-    /// The cells whose value the moment decides at which a step begins: all that every step sets, if a part of that asks about
-    /// the moment, and those that are set from them.
+    /// The cells whose value depends on the moment at which a step begins. They are all cells that every step sets, if a
+    /// part of its effects asks about the moment, and the cells that are set from them.
     pub(crate) fn cells_of_the_moment(&self) -> BTreeSet<usize> {
         let mut found: BTreeSet<usize> = BTreeSet::new();
         if !self.each_step_asks_the_world() {
             return found;
         }
         let count: usize = self.states.iter().map(|state| state.cells).sum();
-        // What every step does happens as a whole or not at all, so the moment decides all of it.
+        // The effects of every step happen as a whole or not at all, so the moment decides all of them.
         let of_each_step = |cell: &usize| self.each_step.iter().any(|set| self.sets_cell(set, *cell));
         found.extend((0..count).filter(of_each_step));
         let all: Vec<&SetDef> =

@@ -1,5 +1,5 @@
-//! What a space, a scenario and a policy *are*, once they are checked. `check` builds them, `prove` reasons
-//! about them, and everything to the right only reads them.
+//! Checked spaces, scenarios and policies. `check` builds them, `prove` reasons about them, and everything to the right
+//! only reads them.
 //!
 //! Read [`Space`] first: actions, rules, states and roads, with every name resolved and every number in SI.
 //! Its expressions are [`expr::Expr`], and [`evaluate`] is their one evaluator. A [`Row`] is one entry of the

@@ -11,7 +11,7 @@ const EQUAL_PART: f64 = 1e-9;
 /// Below this, an f64 without a fraction was not rounded to be so.
 const EXACT: f64 = (1_u64 << 52) as f64;
 
-/// What a word makes of numbers; NaN if one of them has no value.
+/// Combines numbers by a word; NaN if one of them has no value.
 pub(crate) fn of_numbers(word: NumberWord, numbers: impl Iterator<Item = f64>) -> f64 {
     let chosen = |a: f64, b: f64| match word {
         _ if a.is_nan() => a,
@@ -59,7 +59,7 @@ fn are_equal(left: f64, right: f64) -> bool {
     left == right || apart.is_finite() && apart <= EQUAL_PART * largest && !are_exact()
 }
 
-/// Compares with that tolerance. Of less, equal and greater exactly one holds, unless a number is NaN.
+/// Compares with that tolerance. Exactly one of less, equal and greater holds, unless a number is NaN.
 #[inline]
 pub(crate) fn compare_numbers(op: Comparison, left: f64, right: f64) -> bool {
     // The tolerance is asked for only where it decides.
@@ -107,7 +107,7 @@ mod tests {
             assert_eq!(holds(Comparison::GreaterEqual), !found[0], "{left} {right}");
             assert_eq!(holds(Comparison::NotEqual), !found[1], "{left} {right}");
         }
-        // What has no value is in no order.
+        // A missing value is in no order.
         let ordered = [Comparison::Less, Comparison::LessEqual, Comparison::Equal, Comparison::GreaterEqual];
         assert!(ordered.into_iter().all(|op| !compare_numbers(op, f64::NAN, 1.0)));
         assert!(compare_numbers(Comparison::NotEqual, f64::NAN, f64::NAN));

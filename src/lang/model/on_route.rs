@@ -1,5 +1,5 @@
-//! What the place of the ego vehicle on its route says of a moment, whatever else happens: the limit of its lane, the way to
-//! the next junction and to the goal, the light before it, the kind of road.
+//! Facts of a moment that follow from the ego vehicle's place on its route alone: the limit of its lane, the way to the
+//! next junction and to the goal, the light before it, the kind of road.
 //!
 //! `sim` asks for it at a moment. `prove` asks for the whole route, in stretches on each of which all of it is known.
 
@@ -17,7 +17,7 @@ pub const NEAR_JUNCTION_M: f64 = 20.0;
 /// A longer route has so many stretches that nothing is said of them.
 const STRETCHES_MAX: usize = 512;
 
-/// What a place on a route says.
+/// The facts of a place on a route.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OnRoute {
     /// Limit of the lane, m/s.
@@ -129,7 +129,7 @@ pub(crate) fn stretches(map: &RoadMap, route: &Route) -> Vec<Stretch> {
     between.chain(at_lines).map(|(from_m, to_m)| stretch(map, route, from_m, to_m)).collect()
 }
 
-/// What is known between two stations, between which nothing changes but the distances.
+/// The facts between two stations, where nothing changes but the distances.
 fn stretch(map: &RoadMap, route: &Route, from_m: f64, to_m: f64) -> Stretch {
     let (middle_m, half_m) = ((from_m + to_m) / 2.0, (to_m - from_m) / 2.0);
     let OnRoute { limit_mps, junction_ahead_m, route_left_m, signal, road, turn, .. } =

@@ -1,4 +1,4 @@
-//! What a space says of a step or a collision: its reward, its verdicts, and whether it counts.
+//! The judgement of a step or a collision by a space: its reward, its verdicts, and whether it counts.
 
 use crate::model::eval::evaluate;
 use crate::model::expr::{Expr, ExprKind};
@@ -7,9 +7,9 @@ use crate::model::space::{COUNTED, Space};
 use crate::model::value::Memory;
 
 impl Space {
-    /// Reward of a step: the value of the first case that applies; 0 if none does, or if it has no value (a division
-    /// by 0), so that neither a database nor a network meets it. `memory` holds the states after the action of the step,
-    /// `margins` the smallest one of each requirement in it (SI, NaN for one that was not asked).
+    /// Reward of a step: the value of the first case that applies. It is 0 if none applies, or if it has no value (a
+    /// division by 0), so that neither a database nor a network meets it. `memory` holds the states after the action.
+    /// `margins` holds the smallest margin of each requirement in the step (SI, NaN for a requirement that was not asked).
     pub fn reward(&self, outcome: OutcomeFacts, memory: &Memory, margins: &[f64]) -> f64 {
         let facts = Facts { outcome, margins, ..Facts::new(&[], memory) };
         let applies = |condition: &Option<Expr>| {

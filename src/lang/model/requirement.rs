@@ -1,8 +1,8 @@
-//! What the ego vehicle must keep, at a moment: whether it is asked for, whether it holds, and by how much.
+//! Requirements on the ego vehicle, at a moment: whether each is asked for, whether it holds, and by how much.
 //!
-//! The margin is the quantitative meaning of signal temporal logic (Fainekos and Pappas 2009, Donzé and Maler 2010): of
-//! a comparison the difference of its sides, of `and` the smaller of two, of `or` the larger; of `recently` the largest of
-//! the last ticks, of `throughout` the smallest. Above 0 it implies that the condition holds, below 0 that it does not.
+//! The margin is the quantitative meaning of signal temporal logic (Fainekos and Pappas 2009, Donzé and Maler 2010). A
+//! comparison has the difference of its sides, `and` the smaller margin, `or` the larger. `recently` has the largest of the
+//! last ticks, `throughout` the smallest. Above 0 it implies that the condition holds, below 0 that it does not.
 
 use std::collections::VecDeque;
 
@@ -37,7 +37,7 @@ pub struct ReadyRequirement {
     unless: Option<Node>,
     has_margin: bool,
     needed: Vec<usize>,
-    /// What it asks of the past, those within others first.
+    /// Its conditions on the past, inner ones first.
     pasts: Vec<PastNode>,
     /// Whether `after` asks nothing of `npc`.
     after_is_of_ego: bool,
@@ -59,7 +59,7 @@ struct PastNode {
     first: usize,
 }
 
-/// What a requirement remembers from tick to tick, about the ego vehicle or about one road user.
+/// The memory of a requirement from tick to tick, about the ego vehicle or about one road user.
 #[derive(Debug, Clone, Default)]
 pub struct RequirementMemory {
     /// For each word for the past.
@@ -76,12 +76,12 @@ pub struct RequirementMemory {
 struct Past {
     /// Whether enough is past to say something.
     is_known: bool,
-    /// Ticks up to now, and the last one that decides: at which it held (`recently`), or failed (`throughout`). Of `total` and `times`
-    /// the ticks that count.
+    /// Ticks up to now, and the last deciding tick: the condition held there (`recently`), or failed (`throughout`). For
+    /// `total` and `times`, the ticks that count.
     ticks: u32,
     decided: Option<u32>,
-    /// What is said of these ticks now, and by which margin: that of all but `margins`, which were not looked at yet. Of
-    /// `throughout` they have the other sign.
+    /// The result for these ticks now, and its margin, without the `margins` that were not looked at yet. For `throughout`
+    /// the margins have the other sign.
     holds: bool,
     margin: f64,
     largest: Sliding,
@@ -107,7 +107,7 @@ pub struct Asked {
     pub begins: bool,
 }
 
-/// An expression. What is asked often has a node of its own, the rest is left to the evaluator of all expressions.
+/// An expression. Frequent parts have nodes of their own; the evaluator of all expressions does the rest.
 #[derive(Debug, Clone)]
 enum Node {
     Number(f64),
@@ -129,7 +129,7 @@ enum Node {
     Past(usize),
     /// Whether it holds of a road user near with one of these bodies.
     Some(Vec<BodyWord>, Box<Node>),
-    /// Of how many of them it holds.
+    /// The number of road users for which the condition holds.
     Count(Vec<BodyWord>, Box<Node>),
     Other(Expr),
 }
@@ -153,7 +153,7 @@ impl RequirementDef {
         let mut of = |expr: &Expr| Node::of(expr, &mut pasts);
         let [when, until, after, unless] =
             [&self.when, &self.until, &self.after, &self.unless].map(|part| part.as_ref().map(&mut of));
-        // Of the other parts nothing but their truth is asked.
+        // Only the truth of the other parts is needed.
         pasts.iter_mut().filter(|node| !node.is_awaited).for_each(|node| node.has_margin = false);
         ReadyRequirement {
             when,
@@ -175,8 +175,8 @@ impl ReadyRequirement {
         self.after.is_some() || self.until.is_some() || !self.pasts.is_empty()
     }
 
-    /// How one stands at a moment that does not remember; `None` where nothing is asked, because `when` does not hold or a
-    /// road user that it names is not there.
+    /// The state of the requirement at a moment without a memory. `None` where it is not asked, because `when` does not
+    /// hold or a road user that it names is not there.
     #[inline]
     pub fn at(&self, functions: &[FnDef], facts: &Facts<'_>) -> Option<Kept> {
         let at = At { functions, facts, pasts: &[] };
@@ -186,7 +186,7 @@ impl ReadyRequirement {
         Some(self.kept(&at))
     }
 
-    /// How its condition stands. What is excused is kept, as far as can be from failing.
+    /// The state of its condition. An excused condition is kept, as far as can be from failing.
     fn kept(&self, at: &At<'_>) -> Kept {
         match self.unless.as_ref().is_some_and(|unless| at.holds(unless)) {
             true => Kept { holds: true, margin: if self.has_margin { f64::INFINITY } else { f64::NAN } },
@@ -219,8 +219,8 @@ impl ReadyRequirement {
         }
     }
 
-    /// Takes the next tick of what was, but of what is left out. What is the same for all road users comes from `of_ego`, if
-    /// there is such a thing.
+    /// Takes the next tick of the past, except the parts that are left out. Parts that are the same for all road users come
+    /// from `of_ego`, if it is given.
     fn next_pasts(
         &self,
         memory: &mut RequirementMemory,
@@ -238,7 +238,7 @@ impl ReadyRequirement {
                 from[0].take_over(known);
                 continue;
             }
-            // What the condition asks of the past begins once all within it is known.
+            // A condition on the past begins once all parts within it are known.
             if node.is_awaited && within[node.first..].iter().any(|past| !past.is_known) {
                 continue;
             }
@@ -253,8 +253,9 @@ impl ReadyRequirement {
         }
     }
 
-    /// How one stands at the next tick that remembers; `None` as in [`ReadyRequirement::at`], and where `after` does not begin
-    /// to hold or too little is past. Of a requirement with `after` the condition is asked, too, while it `is_awaited`.
+    /// The state of the requirement at the next tick with a memory. `None` as in [`ReadyRequirement::at`], while `after`
+    /// does not begin to hold, and while too little is past. With `after`, the condition is also asked while it
+    /// `is_awaited`.
     pub fn at_next(
         &self,
         memory: &mut RequirementMemory,
@@ -317,7 +318,7 @@ impl Past {
         }
     }
 
-    /// What is said of the past by another one that is about the same.
+    /// Takes the result of another memory of the same past.
     fn take_over(&mut self, known: &Past) {
         (self.is_known, self.holds, self.margin, self.number) =
             (known.is_known, known.holds, known.margin, known.number);
@@ -359,8 +360,8 @@ impl Past {
         }
     }
 
-    /// Takes the number of a tick, and finds the mean of the last ones. They are only ever added up, so that nothing is left of
-    /// what is gone: the older ones are kept as their sums from each of them on, the latest to be popped first.
+    /// Takes the number of a tick, and finds the mean of the last ones. Numbers are only ever added, so nothing is left of
+    /// those that are gone. The older ones are kept as their sums from each of them on, the latest to be popped first.
     fn average(&mut self, number: f64, ticks: u32) {
         self.numbers.push_back(number);
         self.sum += number;
@@ -404,7 +405,7 @@ impl Past {
 }
 
 impl Node {
-    /// Of an expression; what it asks of the past goes to `pasts`.
+    /// Builds the node of an expression; its conditions on the past go to `pasts`.
     fn of(expr: &Expr, pasts: &mut Vec<PastNode>) -> Node {
         let mut node = |expr: &Expr| Node::of(expr, pasts);
         let is_number = |expr: &Expr| matches!(expr.ty, Type::Int | Type::Quantity(_));
@@ -486,8 +487,8 @@ fn asks_of_npc(expr: &Expr) -> bool {
     }
 }
 
-/// Where an expression asks of the past in a way that is not followed: only `and`, `or`, `not`, `implies`, comparisons of
-/// numbers, arithmetic and the past itself may stand around it.
+/// A part of an expression that asks of the past in a place that is not followed. Only `and`, `or`, `not`, `implies`,
+/// comparisons of numbers, arithmetic and the past itself may stand around it.
 pub(crate) fn past_inside(of: &Expr) -> Option<&Expr> {
     let is_number = |expr: &Expr| matches!(expr.ty, Type::Int | Type::Quantity(_));
     match &of.kind {
@@ -587,7 +588,7 @@ impl<'a> At<'a> {
         near.iter().filter(move |near| near.is_of(bodies)).map(move |near| about(Some(near.npc), facts))
     }
 
-    /// What was said of the past at this tick. Those within others are known before them.
+    /// The result about the past at this tick. Inner results are known before outer ones.
     fn past(&self, index: usize) -> Kept {
         let Past { is_known, holds, margin, .. } = self.pasts[index];
         Kept { holds: is_known && holds, margin: if is_known { margin } else { f64::NEG_INFINITY } }
@@ -633,7 +634,7 @@ impl<'a> At<'a> {
                 Kept { holds: !left.holds || right.holds, margin: (-left.margin).max(right.margin) }
             }
             Node::Past(index) => self.past(*index),
-            // Where nobody is near it is as far as can be from holding.
+            // Where no road user is near, the condition is as far as can be from holding.
             Node::Some(bodies, condition) => {
                 let nobody = Kept { holds: false, margin: f64::NEG_INFINITY };
                 self.each_near(bodies).fold(nobody, |some, facts| {
@@ -657,8 +658,8 @@ fn compared(op: Comparison, left: f64, right: f64) -> Kept {
     Kept { holds: compare_numbers(op, left, right), margin }
 }
 
-/// The dimension of a condition's margin; `None` if it has none: truth values, words and `==` have no distance, and distances
-/// of different dimensions cannot be compared.
+/// The dimension of a condition's margin; `None` if it has none: truth values, words and `==` have no distance, and
+/// distances of different dimensions cannot be compared.
 pub(crate) fn margin_dimension(condition: &Expr) -> Option<Dimension> {
     match &condition.kind {
         ExprKind::Compare(Comparison::Equal | Comparison::NotEqual, ..) => None,
@@ -677,7 +678,7 @@ pub(crate) fn margin_dimension(condition: &Expr) -> Option<Dimension> {
     }
 }
 
-/// Where a condition divides by something that is not a number of its own, here or in a function that it calls.
+/// The first part of a condition that divides by anything but a literal number, here or in a function that it calls.
 pub(crate) fn open_divisor<'a>(condition: &'a Expr, functions: &'a [FnDef]) -> Option<&'a Expr> {
     let mut found = None;
     let mut called = Vec::new();
@@ -763,7 +764,7 @@ mod tests {
                 let value = f64::from(half) * 0.5;
                 let (holds, margin) = at(value);
                 assert!(margin == 0.0 || holds == (margin > 0.0), "{condition:?} at {value}");
-                // Whoever is nearer than the margin has the same answer.
+                // Every value nearer than the margin has the same answer.
                 for near in [value - 0.99 * margin.abs(), value + 0.99 * margin.abs()] {
                     assert!(margin == 0.0 || at(near).0 == holds, "{condition:?} at {value} and {near}");
                 }

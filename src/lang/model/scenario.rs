@@ -143,8 +143,8 @@ pub enum Claim {
     Cause { modules: Vec<String>, obstacle: Option<Obstacle> },
     /// `expect priority == other with npc#2`: who had priority in the collision.
     Priority { priority: Priority, obstacle: Option<Obstacle> },
-    /// `expect recurrence == 14 / 20 with npc#2`, `expect stops_at_red.recurrence == 14 / 20`: in how many replays under other
-    /// chance the collision, or the breach of a requirement, happens again.
+    /// `expect recurrence == 14 / 20 with npc#2`, `expect stops_at_red.recurrence == 14 / 20`: in how many replays under
+    /// other chance the collision, or the breach of a requirement, happens again.
     Recurrence { requirement: Option<String>, obstacle: Option<Obstacle>, recurred: u32, replays: u32 },
     /// `expect minimal with npc#2`: if any one step is left out, with its time or without, there is no such
     /// collision.
@@ -180,7 +180,7 @@ impl Scenario {
         })
     }
 
-    /// Whether it says that somebody collides, or that a requirement is breached.
+    /// Whether it claims a collision, or a breach of a requirement.
     pub fn claims_a_finding(&self) -> bool {
         let is_finding = |claim: &Claim| matches!(claim, Claim::Collision { .. } | Claim::Breach { .. });
         self.claims.iter().any(is_finding)
@@ -201,9 +201,9 @@ impl Scenario {
         replays.max().unwrap_or(0)
     }
 
-    /// Whether a crash with an obstacle is one that the scenario is about. If the scenario has claims that name a
-    /// `counted` obstacle, only those obstacles matter; otherwise those that its claims say are hit; with neither, any
-    /// obstacle.
+    /// Whether a crash with an obstacle is one that the scenario is about. If claims name a `counted` obstacle, only those
+    /// obstacles matter. Otherwise the obstacles matter that its claims say are hit. Without either claim, any obstacle
+    /// matters.
     pub fn crashes_with(&self, number: u32) -> bool {
         let of = |is_meant: fn(&Claim) -> Option<Obstacle>| {
             let numbers = self.claims.iter().filter_map(is_meant).map(|obstacle| obstacle.number);

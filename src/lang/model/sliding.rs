@@ -1,4 +1,4 @@
-//! The largest of the last numbers, as they come (Lemire 2006: those that a later, larger one outlives are dropped).
+//! The running maximum of the last numbers (Lemire 2006: a number is dropped once a later, larger one outlives it).
 
 use std::collections::VecDeque;
 

@@ -33,7 +33,7 @@ pub const COUNTED: &str = "counted";
 pub struct Space {
     /// Path of the root file, as given.
     pub path: PathBuf,
-    /// What all declarations say, maps included: see [`Use::digest`](crate::syntax::ast::Use).
+    /// The meaning of all declarations, maps included: see [`Use::digest`](crate::syntax::ast::Use).
     pub meaning: Meaning,
     /// Documentation of the root file.
     pub docs: Vec<String>,
@@ -47,10 +47,10 @@ pub struct Space {
     pub functions: Vec<FnDef>,
     pub actions: Vec<ActionDef>,
     pub groups: Vec<GroupDef>,
-    /// What happens at the end of every step, after the effects of its action.
+    /// The effects at the end of every step, after the effects of its action.
     pub each_step: Vec<SetDef>,
     pub rules: Vec<RuleDef>,
-    /// What the ego vehicle must keep, in the order of declaration.
+    /// The requirements on the ego vehicle, in the order of declaration.
     pub requirements: Vec<RequirementDef>,
     pub episode: EpisodeDef,
     /// The first case that applies gives the reward.
@@ -94,7 +94,7 @@ pub struct StateDef {
     pub cells: usize,
     /// How each of its cells begins.
     pub initial: Vec<Initial>,
-    /// What the state stands for in the world.
+    /// The meaning of the state in the world.
     pub meaning: StateMeaning,
     pub span: Span,
 }
@@ -107,7 +107,7 @@ pub enum Initial {
     Value(Expr),
 }
 
-/// What a state variable stands for in the world. The lists give the engine's word for each variant.
+/// The meaning of a state variable in the world. The lists give the engine's word for each variant.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StateMeaning {
     /// Nothing: only the space's rules and effects use it.
@@ -130,7 +130,7 @@ pub struct Row {
     pub label: String,
     /// Indices in `Space::rules` of the rules that bind the row, optional ones included.
     pub rules: Arc<[usize]>,
-    /// What is proved of the row on each road of `Space::roads` under the default rules.
+    /// The proofs about the row on each road of `Space::roads` under the default rules.
     pub roads: Vec<Reach>,
 }
 
@@ -227,7 +227,7 @@ impl ActionDef {
         })
     }
 
-    /// The spawn of who bears a name.
+    /// The spawn of the road user with this name.
     pub(crate) fn spawn_of(&self, bearer: usize) -> Option<&SpawnDef> {
         self.spawns().find(|spawn| spawn.bearer == Some(bearer))
     }
@@ -237,7 +237,7 @@ impl ActionDef {
         self.effects.iter().filter_map(EffectDef::manoeuvre).map(|call| call.manoeuvre)
     }
 
-    /// What it orders named road users to do.
+    /// Its orders to named road users.
     pub(crate) fn orders(&self) -> impl Iterator<Item = &OrderDef> {
         self.effects.iter().filter_map(|effect| match effect {
             EffectDef::Order(order) => Some(&**order),
@@ -245,7 +245,7 @@ impl ActionDef {
         })
     }
 
-    /// What it tells the ego vehicle's next traffic light.
+    /// Its orders to the ego vehicle's next traffic light.
     pub(crate) fn light_orders(&self) -> impl Iterator<Item = &LightDef> {
         self.effects.iter().filter_map(|effect| match effect {
             EffectDef::Light(light) => Some(&**light),
@@ -352,12 +352,12 @@ pub struct SpawnDef {
     pub behind: bool,
     /// The road user from which the distance is measured, in place of the ego vehicle.
     pub of: Option<Who>,
-    /// The trajectory that it follows, by index in `Space::trajectories`. The distance is then its station there, of one that
-    /// lies beside the route where that begins.
+    /// The trajectory that it follows, by index in `Space::trajectories`. The distance is then its station there, of one
+    /// that lies beside the route where that begins.
     pub trajectory: Option<WordExpr<usize>>,
     /// The parked vehicle from behind which a pedestrian steps.
     pub cover: Option<WordExpr<BodyWord>>,
-    /// What else it is told.
+    /// The other fields of its order.
     pub told: Fields<Term>,
     /// The name that it bears from then on, by index in `Space::bearers`.
     pub bearer: Option<usize>,
@@ -368,7 +368,7 @@ pub struct SpawnDef {
     pub span: Span,
 }
 
-/// What a road user does, phase by phase.
+/// The behaviour of a road user, phase by phase.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ManoeuvreDef {
     pub name: String,
@@ -402,7 +402,7 @@ pub fn reached<'a>(manoeuvre: usize, of: impl Fn(usize) -> Option<&'a ManoeuvreD
     found
 }
 
-/// What all that a manoeuvre may come to tells.
+/// The fields told by all manoeuvres that this one may lead to.
 pub fn told<'a>(manoeuvre: usize, of: impl Fn(usize) -> Option<&'a ManoeuvreDef>) -> Told {
     let all = reached(manoeuvre, &of);
     let phases = all.iter().filter_map(|one| of(*one)).flat_map(|one| &one.phases);
@@ -470,7 +470,7 @@ impl SpawnDef {
     }
 }
 
-/// What the ego vehicle's next traffic light is told to show.
+/// An order to the ego vehicle's next traffic light.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LightDef {
     pub colour: WordExpr<LightColour>,
@@ -478,7 +478,7 @@ pub struct LightDef {
     pub at: Option<Expr>,
 }
 
-/// What the latest bearer of a name is told to do.
+/// An order to the latest bearer of a name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OrderDef {
     pub who: Who,
@@ -518,7 +518,7 @@ pub enum RuleBody {
     /// A condition under which a commanded lane change may begin; states are not known then.
     During(Vec<RuleBinding>),
     /// A condition under which a phase of a manoeuvre may begin; its locals are the manoeuvre's parameters. The rule binds
-    /// the actions that give the manoeuvre to somebody.
+    /// the actions that give the manoeuvre to a road user.
     Phases { manoeuvre: usize, condition: Expr, actions: Vec<usize> },
     /// `allowed[from][to]` for a plain state, or for one key of a map; `cell` is its position in the memory. The rule
     /// binds the actions that may set it.
@@ -531,12 +531,12 @@ pub struct RuleBinding {
     pub condition: Expr,
 }
 
-/// What the ego vehicle must keep, judged at every tick.
+/// A requirement on the ego vehicle, judged at every tick.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RequirementDef {
     pub name: String,
     pub docs: Vec<String>,
-    /// What it says, in one line of the language, for those who read what came of it.
+    /// Its text, in one line of the language, for readers of the results.
     pub formula: String,
     /// Off unless `--with` names it.
     pub optional: bool,
@@ -603,7 +603,7 @@ pub struct VerdictDef {
     pub name: String,
     pub docs: Vec<String>,
     pub condition: Expr,
-    /// What the condition joins by `and`, as it was written.
+    /// The conditions that `and` joins, as they were written.
     pub clauses: Vec<String>,
 }
 
@@ -639,8 +639,8 @@ pub struct SignalProgram {
 }
 
 impl Space {
-    /// The names of the road users about whom a row is: whom it orders, to whom a gap is kept, beside whom somebody appears, or
-    /// about whom its rules ask, and whom it does not make appear itself.
+    /// The names of the road users that a row depends on and does not spawn itself. The row orders them, keeps a gap to
+    /// them, spawns beside them, or its rules ask about them.
     pub fn about(&self, row: &Row) -> Vec<usize> {
         let action = &self.actions[row.action];
         let named = action.effects.iter().flat_map(|effect| match effect {
@@ -659,14 +659,14 @@ impl Space {
         about
     }
 
-    /// The rows that make somebody of a name appear, first those that do so for sure.
+    /// The rows that spawn a road user of this name; the rows that surely do so come first.
     pub fn makers(&self, bearer: usize) -> impl Iterator<Item = &Row> {
         let which =
             move |sure: bool| self.rows.iter().filter(move |row| self.makes(row, bearer) == Some(sure));
         which(true).chain(which(false))
     }
 
-    /// Whether a row makes somebody of a name appear, and if so, whether for sure.
+    /// Whether a row spawns a road user of this name, and if so, whether surely.
     fn makes(&self, row: &Row, bearer: usize) -> Option<bool> {
         let spawn = self.actions[row.action].spawn_of(bearer)?;
         Some(self.surely_appears(row, spawn))
@@ -687,8 +687,8 @@ impl Space {
         (*nth as f64) < least
     }
 
-    /// Rows that, one after another, make everybody appear about whom a row is: for each name the first one that does, after
-    /// those that this one needs itself.
+    /// Rows that, one after another, spawn all road users that a row depends on. Each name has the first row that spawns
+    /// it. Rows that this first row depends on come before it.
     pub fn rows_before(&self, row: &Row) -> Vec<usize> {
         let (mut before, mut seen) = (Vec::new(), vec![row.index]);
         self.add_makers(row, &mut before, &mut seen);
@@ -739,8 +739,8 @@ impl Space {
         &self.rows[first..end]
     }
 
-    /// What the rules leave of a parameter's range on a road, over all rows of its action that can run
-    /// there; `None` if none can, or the parameter has no range.
+    /// The part of a parameter's range on a road that the rules leave, over all rows of its action that can run there;
+    /// `None` if none can, or the parameter has no range.
     pub fn range_on(&self, action: usize, parameter: &Parameter, road: usize) -> Option<Interval> {
         let ranges = self.rows_of(action).iter().filter_map(|row| row.roads[road].ranges()).flatten();
         let kept = ranges.filter(|(name, _)| *name == parameter.name).map(|(_, interval)| *interval);

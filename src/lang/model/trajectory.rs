@@ -101,8 +101,8 @@ const STEP_M: f64 = 0.25;
 const PIECES_MIN: usize = 8;
 
 impl BesideRoute {
-    /// A curve through the points (a centripetal Catmull-Rom spline: Yuksel, Schaefer and Keyser 2009), of a new one behind each
-    /// that is written twice. `None` if it has no length.
+    /// A curve through the points (a centripetal Catmull-Rom spline: Yuksel, Schaefer and Keyser 2009). Behind each point
+    /// that is written twice, a new curve begins. `None` if it has no length.
     pub fn new(points: &[WayPoint]) -> Option<BesideRoute> {
         let is_twice = |a: &WayPoint, b: &WayPoint| (a.place - b.place).norm() < SAME_M;
         let mut curved = Vec::new();

@@ -62,7 +62,7 @@ impl Value {
         }
     }
 
-    /// Position among the variants of its enum; `false` is 0 and `true` is 1; 0 for a number.
+    /// Position among the variants of its enum. `false` is 0, `true` is 1, and a number has 0.
     pub fn variant(self) -> usize {
         match self {
             Value::Variant(_, index) => index,

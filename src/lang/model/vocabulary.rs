@@ -1,8 +1,8 @@
 //! The table of the engine's words: facts, fields, claims, and what a `spawn`, a `set time` or a `set sky`
 //! may mean.
-//! A row holds the spelling of a word and one sentence for people. The facts have a table of their own (`fact`). Each becomes
-//! known at a stated time ([`Known`]), which decides where it may be read and when a rule that reads it is judged. The
-//! checker, the editor's server, the highlighter and the test of LANGUAGE.md read the rows. Keywords stand in
+//! A row holds the spelling of a word and one sentence for people. The facts have a table of their own (`fact`). Each
+//! becomes known at a stated time ([`Known`]), which decides where it may be read and when a rule that reads it is judged.
+//! The checker, the editor's server, the highlighter and the test of LANGUAGE.md read the rows. Keywords stand in
 //! `syntax::keyword`, because the grammar knows them.
 //!
 //! Enums are the author's; the names of their variants must be found here wherever a value reaches
@@ -195,7 +195,7 @@ const LENGTH: Type = Type::Quantity(Dimension::LENGTH);
 const RATIO: Type = Type::Quantity(Dimension::RATIO);
 const SPEED: Type = Type::Quantity(Dimension::SPEED);
 
-/// What a rule may restrict instead of the draw.
+/// The lane changes that a rule may restrict instead of the draw.
 pub const CHANGE: (&str, &str) = (
     "change",
     "`during change`: a lane change that the action commands begins only while the condition holds.",
@@ -330,7 +330,7 @@ words! {
     At "at" = "How far the ego vehicle's front is before its line then: `at: 30 m`; at once without it.",
 }
 
-/// What `order` calls the ego vehicle's next traffic light.
+/// The word of `order` for the ego vehicle's next traffic light.
 pub const LIGHT: (&str, &str) =
     ("light", "The ego vehicle's next traffic light: `order light { colour: Yellow, at: 30 m }`.");
 

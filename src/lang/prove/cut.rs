@@ -108,8 +108,7 @@ pub struct Removal {
     pub percent_max: f64,
 }
 
-/// What a rule by itself removes from the ranges of the rows that it binds; empty if the rule bounds no
-/// range.
+/// The parts that a rule alone removes from the ranges of the rows that it binds; empty if the rule bounds no range.
 pub fn removals(space: &Space, rule: usize) -> Vec<Removal> {
     let alone = RulesInForce::only(space, rule);
     let mut found: Vec<Removal> = Vec::new();

@@ -32,7 +32,7 @@ pub(crate) enum Values {
     Variants(u128),
 }
 
-/// What is known where an expression stands.
+/// The facts known where an expression stands.
 #[derive(Clone, Copy)]
 pub(crate) struct Known<'a> {
     pub functions: &'a [FnDef],
@@ -133,7 +133,7 @@ impl Values {
         }
     }
 
-    /// What is in both; all of `self` if that is nothing, since nearly equal numbers pass comparisons, too.
+    /// The values in both; all of `self` if there are none, since nearly equal numbers pass comparisons, too.
     fn both(self, other: Values) -> Values {
         match (self, other) {
             (Values::Number(a), Values::Number(b)) if !a.intersect(&b).is_empty() => {
@@ -183,7 +183,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         ExprKind::OfBearer(_, fact) if fact_range(*fact).is_none() => Values::UNKNOWN_TRUTH,
         ExprKind::OfBearer(..) => Values::Number(Interval::ALL),
         ExprKind::IsThere(_) | ExprKind::Breached(_) => Values::UNKNOWN_TRUTH,
-        // What is known of this moment says nothing of those before it.
+        // Facts of this moment say nothing of earlier moments.
         ExprKind::Past(_, PastWord::Change, _) | ExprKind::Margin(_) => Values::Number(Interval::ALL),
         ExprKind::Past(_, PastWord::Total, ticks) => {
             let most_s = Rational::new((*ticks * TICK_MS).into(), 1000);
@@ -192,7 +192,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
             )
         }
         ExprKind::Past(_, PastWord::Times, ticks) => Values::Number(between(0.0, f64::from(*ticks))),
-        // Of whom it is asked, is not known; there may be nobody.
+        // The road users near are not known; there may be none.
         ExprKind::Near(word, _, condition) => {
             let may_hold = enclose(condition, &Known { case: None, ..*known }).may_hold();
             match (word, may_hold) {
@@ -291,8 +291,8 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
     }
 }
 
-/// All values of an arm of a `match`, which is taken where the subject is one of these variants: what the subject names has there
-/// only some of its values.
+/// All values of an arm of a `match`, which is taken where the subject is one of these variants. The names in the subject
+/// have only some of their values there.
 fn within(arm: &Expr, subject: &Expr, variants: u128, known: &Known<'_>) -> Values {
     let mut narrower = Vec::new();
     match subject.ty {
@@ -325,7 +325,7 @@ fn within(arm: &Expr, subject: &Expr, variants: u128, known: &Known<'_>) -> Valu
     enclose(arm, &Known { locals: &locals, cells: &cells, case: Some(&case), ..*known })
 }
 
-/// What names may be where a condition is `truth`, as far as comparisons in it say so.
+/// The values that names may have where a condition is `truth`, as far as comparisons in it say so.
 fn narrow<'e>(condition: &'e Expr, truth: bool, known: &Known<'_>, found: &mut Vec<(&'e Expr, Values)>) {
     effort::spend(1);
     // A comparison fails, too, where a side has no value: then it says nothing of the other one.
@@ -381,7 +381,7 @@ fn fact_values(fact: Fact, known: &Known<'_>) -> Values {
     }
 }
 
-/// What facts of lines say where there is none, m.
+/// The value of facts of lines where there is no line, m.
 const NO_LINE_M: f64 = -100.0;
 
 fn between(low: f64, high: f64) -> Interval {
@@ -391,7 +391,7 @@ fn between(low: f64, high: f64) -> Interval {
     }
 }
 
-/// What a fact that is a number may be, on any road and at any moment.
+/// The range of a fact that is a number, on any road and at any moment.
 pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
     let (low, high) = fact.range().into_inner();
     (fact.ty() != Type::Bool).then(|| match (low, high) {
@@ -422,13 +422,13 @@ fn or(left: Values, right: Values) -> Values {
     }
 }
 
-/// Compares two expressions. What both name has one value: `step > step` never holds, whatever the step is, and
+/// Compares two expressions. A name has the same value on both sides: `step > step` never holds, whatever the step is, and
 /// `ego.speed > ego.speed + nearest.gap` neither.
 fn compare_parts(op: Comparison, left: &Expr, right: &Expr, known: &Known<'_>) -> Values {
     if lacks_value(left, known) || lacks_value(right, known) {
         return Values::truth(op == Comparison::NotEqual);
     }
-    // What a number was, and by how much it changed, has no value at first.
+    // A past number, and its change, have no value at first.
     let looks_back =
         |expr: &Expr| expr.any(|kind| matches!(kind, ExprKind::Past(_, PastWord::Change | PastWord::Ago, _)));
     let found = compare_known(op, left, right, known);
@@ -511,7 +511,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(400))]
 
-        /// What two sums share is cancelled: the verdict holds for every value, and where nothing else is left it is sharp.
+        /// Shared terms of two sums are cancelled: the verdict holds for every value, and where nothing else is left it is
+        /// sharp.
         #[test]
         fn sums_that_share_terms_are_compared(
             left in prop::array::uniform4(-3..4_i64), right in prop::array::uniform4(-3..4_i64),
@@ -539,7 +540,7 @@ mod tests {
             prop_assert!(is_sharp || !shares_all || matches!(op, Equal | NotEqual));
         }
 
-        /// What an arm of a `match` gives lies within what is enclosed, however its condition narrows the values; so do the
+        /// The value of an arm of a `match` lies within the enclosed values, however its condition narrows them. So do the
         /// lesser, the greater and the size of two numbers.
         #[test]
         fn an_arm_has_the_values_that_its_condition_leaves(

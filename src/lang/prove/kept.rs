@@ -6,8 +6,8 @@ use crate::prove::moment::{Case, may_hold_together};
 use crate::prove::{Known, enclose};
 use crate::syntax::Diagnostic;
 
-/// One warning for each requirement whose condition holds at every moment on every road, or which is asked at none; and for
-/// each whose condition cannot hold where it is asked, so that it is breached by everybody.
+/// One warning for each requirement whose condition holds at every moment on every road, or that is never asked. Another
+/// for each requirement whose condition cannot hold where it is asked, so that every driving system breaches it.
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let cells = space.cells_unknown();
     let mut diagnostics = Vec::new();
@@ -29,7 +29,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
         let when: Vec<&Expr> = required.when.iter().collect();
         let with_condition = [&when[..], &[&required.condition]].concat();
         let is_opposed = || {
-            // What is asked later, or somewhere else, may hold there.
+            // A condition that is asked later, or somewhere else, may hold there.
             required.until.is_none()
                 && required.after.is_none()
                 && required.unless.is_none()

@@ -1,14 +1,13 @@
-//! What holds of a space whatever is drawn: which rows are dead, which rules are idle, which spawns are
-//! unfair.
+//! Proofs about a space for every draw: which rows are dead, which rules are idle, which spawns are unfair.
 //!
 //! A proof works on exact intervals (`enclose`, `reach`), so it may say too little, never too much. It goes
 //! over the demands and bounds of `model::rules`. A witness is found by search and judged as drawing judges.
 //!
-//! Three proofs follow states, and each needs a walk of its own. `clock` asks of one cell, on all roads and at any time,
-//! what the moves of its rule allow. `time` follows sets of values, too many rather than too few, because it must not let
-//! a rule pass that time breaks. `realise` follows single memories that an episode certainly comes to, too few rather
-//! than too many, because a row that it says runs must run. With `time`'s states `realise` would call rows possible that
-//! are not; with `realise`'s, `time` would miss what it did not follow.
+//! Three proofs follow states, and each needs a walk of its own. `clock` follows one cell on all roads and at any time, and
+//! asks what the moves of its rule allow. `time` follows sets of values, rather too many than too few: it must not pass a
+//! rule that time breaks. `realise` follows single memories that an episode certainly reaches, rather too few than too
+//! many: a row that it says runs must run. With `time`'s states, `realise` would call impossible rows possible. With
+//! `realise`'s, `time` would miss states.
 
 mod cells;
 mod clock;

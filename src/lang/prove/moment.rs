@@ -1,10 +1,10 @@
 //! Whether facts of the moment can meet conditions together: `ego.light == Red and ego.light == Green` holds at no
 //! moment, nor does `ego.speed >= 200 m/s`.
 //!
-//! What a fact may be is cut into pieces where a condition compares it with something known. If in every combination
-//! of pieces some condition fails, no moment meets them all. What is known of facts together stands in [`Case::is_possible`], of
-//! a newcomer in [`newcomers`], and of a road in its stretches, one of which the ego vehicle is on; otherwise facts are taken to
-//! be independent, so a combination that is possible here may still never come.
+//! The range of a fact is cut into pieces where a condition compares it with something known. If in every combination of
+//! pieces some condition fails, no moment meets them all. [`Case::is_possible`] knows which facts exclude each other,
+//! [`newcomers`] the facts of newcomers. The stretches of a road hold its facts; the ego vehicle is on one of them. All
+//! other facts are taken to be independent, so a combination that is possible here may still never come.
 
 use core::ops::RangeInclusive;
 
@@ -33,7 +33,7 @@ const PARTS_STEPS: usize = 2;
 pub(crate) struct Case {
     numbers: Vec<(Fact, Interval)>,
     words: Vec<(WordFact, &'static str)>,
-    /// What some facts are not.
+    /// The words that some facts do not have.
     not_words: Vec<(WordFact, &'static str)>,
 }
 
@@ -60,7 +60,7 @@ impl Case {
         self.numbers.iter().find(|(known, _)| *known == fact).map(|(_, piece)| *piece)
     }
 
-    /// What a stretch of a route says of a moment.
+    /// The facts of a moment that a stretch of a route gives.
     fn of_stretch(stretch: &Stretch) -> Case {
         let Stretch { limit_mps, junction_ahead_m, route_left_m, has_light, road, turn } = stretch;
         let numbers = vec![
@@ -78,7 +78,7 @@ impl Case {
         Case { numbers, words, not_words }
     }
 
-    /// What both say, of facts that only one of them knows.
+    /// The facts that both know, and those that only one of them knows.
     fn and(&self, other: &Case) -> Case {
         let mut both = self.clone();
         both.numbers.extend(&other.numbers);
@@ -125,11 +125,12 @@ impl Case {
 /// `nearest.gap` without a road user, m.
 const NO_ROAD_USER_M: i64 = 100;
 
-/// What is known of each newcomer of an action before it appears, beside what is known of the moment; of an action
-/// without newcomers, that of the moment. The world lets nothing appear faster than it was asked to be. Where `lands` is set, it also appears at the distance that was asked for, as far as its verb means a place on
-/// the route: so it is where the road is straight and free.
+/// The facts of each newcomer of an action before it appears, added to the facts of the moment. An action without newcomers
+/// has the facts of the moment alone. The world lets nothing appear faster than it was asked to be. Where `lands` is set, a
+/// newcomer also appears at the asked distance, if its verb means a place on the route. That is so where the road is
+/// straight and free.
 pub(super) fn newcomers(action: &ActionDef, known: &Known<'_>, lands: bool) -> Vec<Case> {
-    // Of those who may be missing nothing is known.
+    // Nothing is known of a newcomer that may be missing.
     let surely_appears = |spawn: &&SpawnDef| {
         spawn.row.as_ref().is_none_or(|row| {
             let least = |count: &Expr| enclose(count, known).interval().low;
@@ -156,7 +157,7 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
     };
     let Case { mut numbers, words, not_words } = known.case.cloned().unwrap_or_default();
     let asked = enclose(&spawn.speed, known).interval().intersect(&at_most(*SPAWN_SPEED_MPS.end()));
-    // Who crosses on foot waits at first, and who stands does so for good.
+    // A crossing pedestrian waits at first, and one with `Stand` waits for good.
     let speed = match verbs.iter().all(|verb| matches!(verb, Verb::Walk | Verb::Stand)) {
         true => Interval::point(Rational::ZERO),
         false => Interval { low: End::At(Rational::ZERO, true), high: asked.high },
@@ -207,8 +208,8 @@ pub(super) fn may_hold_together(
     !oppose(&asking, known, false) && places(&asking, known).any(|place| meets_all(&place))
 }
 
-/// What the road says of the moments of which conditions ask: a case for each stretch of the route, or one of which nothing is
-/// known.
+/// The facts of the road at the moments that conditions ask about: a case for each stretch of the route, or one without
+/// known facts.
 fn places<'a>(asking: &[&Expr], known: &Known<'a>) -> impl Iterator<Item = Case> + use<'a> {
     let is_of_place = |kind: &ExprKind| {
         matches!(
@@ -381,7 +382,7 @@ fn facts_named(conditions: &[&Expr]) -> (Vec<Fact>, Vec<WordFact>) {
     (numbers, words)
 }
 
-/// What a fact may be at a draw, on a road if one is given.
+/// The range of a fact at a draw, on a road if one is given.
 fn range(fact: Fact, road: Option<&RoadFacts>, episode: &EpisodeDef) -> Interval {
     let all = fact_range(fact).unwrap_or(Interval::ALL);
     let along = |of: fn(&Stretch) -> (f64, f64)| {
@@ -398,7 +399,7 @@ fn range(fact: Fact, road: Option<&RoadFacts>, episode: &EpisodeDef) -> Interval
         }
         Fact::EgoRouteLeft => along(|stretch| (*stretch.route_left_m.start(), *stretch.route_left_m.end())),
         Fact::NpcLimit => road.map(|road| measured(road.map_limits_mps[0], road.map_limits_mps[1])),
-        // What is pushed is no faster than what pushes it.
+        // A pushed vehicle is no faster than the vehicle that pushes it.
         Fact::NearestSpeed => road.map(|road| {
             let ambient_mps = LIMIT_PART_MAX * road.map_limits_mps[1];
             measured(0.0, SPEED_MPS_MAX.max(ambient_mps))

@@ -316,7 +316,7 @@ impl<'a> RowRules<'a> {
         Known { functions: &self.space.functions, locals, cells, road: self.road, case: None }
     }
 
-    /// What each rule of a conflict wants, in words.
+    /// The limits that the rules of a conflict want, in words.
     fn reason(self, rules: &[usize]) -> String {
         let parameters = &self.space.actions[self.row.action].parameters;
         let locals = declared(self.space, self.row);
@@ -335,7 +335,7 @@ impl<'a> RowRules<'a> {
                 let unit = parameter.unit().or_else(|| unit_of_literal(&bound.limit));
                 wanted.push((parameter, (limit, unit), locals[bound.local].interval()));
             }
-            // Two limits that look alike would make no conflict.
+            // Two limits that print alike would show no conflict.
             let ends: Vec<_> =
                 wanted.iter().flat_map(|(_, (limit, _), declared)| [*limit, *declared]).collect();
             let decimals = Interval::decimals_of(&ends);
@@ -387,7 +387,7 @@ impl<'a> RowRules<'a> {
     }
 }
 
-/// What a bound allows, and the unit in which it is told.
+/// The values that a bound allows, and the unit of the message.
 type Limit = (Interval, Option<&'static Unit>);
 
 /// The unit in which a limit is written that is a number; `None` for SI's, and for what is computed.
@@ -398,7 +398,7 @@ fn unit_of_literal(limit: &Expr) -> Option<&'static Unit> {
     }
 }
 
-/// What the parameters of a row may be before any rule.
+/// The values that the parameters of a row may have before any rule.
 pub(crate) fn declared(space: &Space, row: &Row) -> Vec<Values> {
     let action = &space.actions[row.action];
     effort::spend(action.parameters.len());
@@ -548,8 +548,8 @@ struct Masked<'a> {
     roads: Vec<&'a str>,
 }
 
-/// One remark for the roads on which the same rows of an action are masked by the same rules, and which run on others; one for
-/// all of many roads.
+/// One remark for all roads on which the same rules mask the same rows of an action, if these rows run on others. Many
+/// roads share one remark.
 fn report_masked(space: &Space, action: &ActionDef, left: &[&Row]) -> Vec<Diagnostic> {
     let mut found: Vec<Masked> = Vec::new();
     for (index, road) in space.roads.iter().enumerate() {

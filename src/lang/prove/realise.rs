@@ -1,8 +1,8 @@
 //! Which rows run on which road, in the states to which an episode comes.
 //!
-//! A row is searched for in the states in which an episode begins, then step by step in those to which rows and time lead
-//! from there, until every row has run once or the episode is over. What never ran there is searched for in other states
-//! and at other times.
+//! A row is searched for in the states in which an episode begins. Then the search follows rows and time step by step,
+//! until every row has run once or the episode is over. Rows that never ran are searched for in other states and at other
+//! times.
 
 use std::collections::BTreeSet;
 
@@ -21,7 +21,7 @@ const BOXES_MAX: usize = 20_000;
 /// The most states that are followed from step to step on one road, beside those to which time alone leads.
 const STATES_MAX: usize = 256;
 
-/// What is found of a row on a road.
+/// The finding about a row on a road.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Realised {
     /// It runs in a state in which a step of an episode may begin, at its time.
@@ -38,7 +38,7 @@ pub enum Realised {
     NotSearched,
 }
 
-/// What is found of every row on every road, by row and road.
+/// The findings about every row on every road, by row and road.
 pub type Realisable = Vec<Vec<Realised>>;
 
 /// The states in which rows were found to run.
@@ -242,7 +242,7 @@ impl<'a> OnRoad<'a> {
             }
         }
         match (is_proved, is_complete) {
-            // What the moment decides may be as the rules want it.
+            // Facts of the moment may be as the rules want them.
             _ if self.is_of_the_moment(asked.row) => Realised::Elsewhere,
             (true, _) => Realised::Never,
             (false, true) => Realised::Unreached,
@@ -286,7 +286,7 @@ struct Met {
     since: u64,
     /// Whether the first start comes here without an action. Such states are followed however many others there are.
     is_waited_for: bool,
-    /// What rows make of it that ask for no time.
+    /// The states that rows lead to from here, if they do not ask for the time.
     led_to: BTreeSet<usize>,
     /// The rows, by position, that were not tried here, or that ask for the time.
     open: Vec<usize>,

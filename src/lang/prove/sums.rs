@@ -10,7 +10,7 @@ use avastra_base::units::Rational;
 /// The most comparisons of one question that are held against each other.
 const COMPARED_MAX: usize = 64;
 
-/// What the left side is more than the right one; `None` if they name nothing alike, or where one may have no value.
+/// The left side minus the right one; `None` if they share no name, or if one side may have no value.
 pub(super) fn difference(left: &Expr, right: &Expr, known: &Known<'_>) -> Option<Interval> {
     if is_same(left, right) && !may_lack_a_value(left, known) {
         return Some(Interval::point(Rational::ZERO));
@@ -111,8 +111,8 @@ pub(super) fn may_lack_a_value(expr: &Expr, known: &Known<'_>) -> bool {
 /// Whether comparisons that must all hold exclude each other: `a > b` and `b > a`, `a > b + 1` and `a < b`. All that they
 /// name is a fact or a drawn number, so that it is the same wherever it is named.
 ///
-/// Two measured numbers are equal if they are nearly so, and `a == b` and `a == b + 1e-12` may both hold: with `are_apart`,
-/// that is passed over for `==`, and what is left is no proof. For `<=` it is passed over always (docs/open.md).
+/// Two measured numbers are equal if they are nearly so, and `a == b` and `a == b + 1e-12` may both hold. With `are_apart`,
+/// that is ignored for `==`, and the result is no proof. For `<=` it is always ignored (docs/open.md).
 pub(super) fn oppose(conditions: &[&Expr], known: &Known<'_>, are_apart: bool) -> bool {
     let mut comparisons = Vec::new();
     conditions.iter().for_each(|condition| conjuncts(condition, &mut comparisons));
@@ -161,13 +161,13 @@ fn conjuncts<'a>(condition: &'a Expr, found: &mut Vec<(Comparison, &'a Expr, &'a
     }
 }
 
-/// Whether a term is the same in every condition of a draw; a state is not, because a `where` may ask for it before the
-/// effects and a rule after them.
+/// Whether a term is the same in every condition of a draw. A state is not: a `where` may ask for it before the effects and
+/// a rule after them.
 fn is_fixed(term: &Expr) -> bool {
     matches!(term.kind, ExprKind::Fact(_) | ExprKind::Local(_))
 }
 
-/// What a comparison with a limit leaves of the left side; `None` if that is everything.
+/// The part of the left side that a comparison with a limit leaves; `None` if that is everything.
 fn leaves(op: Comparison, limit: Rational, is_exact: bool) -> Option<Interval> {
     let is_told = match op {
         Comparison::Less | Comparison::LessEqual | Comparison::Greater | Comparison::GreaterEqual => true,

@@ -1,10 +1,9 @@
 //! Rules on states and time where time alone passes: `elapsed >= 30 s implies sky[Rain] == None`.
 //!
-//! A rule that holds from the first moment on is asked of every action. A step may also pass without an action; then
-//! nothing can be refused, so it has to be shown that the rule holds there too. The states to which an episode may come
-//! are followed from step to step, each with all that an action or a wait makes of it. They are sets of values
-//! ([`Values`]), so that too many may be followed, never too few: a rule may be refused that would hold, none is let
-//! pass that would not.
+//! A rule that holds from the first moment on is asked of every action. A step may also pass without an action. Then
+//! nothing can be refused, so the proof has to show that the rule holds there too. It follows the states of an episode from
+//! step to step, each with all results of an action or a wait. They are sets of values ([`Values`]), so too many may be
+//! followed, never too few. So a rule may be refused that would hold, but no broken rule passes.
 
 use core::ops::RangeInclusive;
 use std::collections::BTreeSet;
@@ -66,8 +65,8 @@ impl BrokenByTime {
     }
 }
 
-/// One error for each rule that time breaks on some road; one warning for each optional rule with which time breaks
-/// one, if it is in force beside those by default.
+/// One error for each rule that time breaks on some road. One warning for each optional rule with which time breaks a rule,
+/// if it is in force beside the default rules.
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut found: Vec<BrokenByTime> = Vec::new();
     let mut with_optional: Vec<(usize, BrokenByTime)> = Vec::new();
@@ -174,7 +173,7 @@ pub fn lasts(space: &Space, road: &Road, in_force: &RulesInForce) -> Result<(), 
 /// All values of every cell; of those that no timed rule depends on, every value that there is.
 type Cells = Vec<Values>;
 
-/// What one row makes of a state.
+/// The result of one row in a state.
 struct Move {
     row: usize,
     locals: Vec<Values>,
@@ -282,7 +281,7 @@ impl States<'_> {
     /// As [`States::stands`], with the moves that every step would make.
     fn stands_after(&self, from: &[Values], to: &[Values], case: &Case) -> (bool, bool) {
         let mut found = self.stands(to, case);
-        // What every step does does not happen either where a number would leave what a state may be.
+        // The effects of every step do not happen either where a number would leave the limits of a state.
         let most = STATE_MAX as i64;
         let kept = Interval::closed(Rational::integer(-most), Rational::integer(most));
         for cell in &self.followed {
@@ -301,7 +300,7 @@ impl States<'_> {
         found
     }
 
-    /// What a rule says of a state, if it stands for all states; any other rule holds.
+    /// The value of a rule in a state, if the rule stands for all states; any other rule holds.
     fn condition(&self, rule: usize, cells: &[Values], case: &Case) -> Values {
         let condition = self.space.rules[rule].start.as_ref();
         condition.map_or(Values::truth(true), |condition| enclose(condition, &self.known(&[], cells, case)))
@@ -323,7 +322,7 @@ impl States<'_> {
         })
     }
 
-    /// What the rows make of a state that set a followed cell; the others make of it what a wait does.
+    /// The results of the rows that set a followed cell in a state; the other rows do the same as a wait.
     fn moves_of(&mut self, state: usize) -> Vec<Move> {
         let mut moves = Vec::new();
         // Other rules than those by default may enable rows that are dead by default.
@@ -450,8 +449,8 @@ fn may_move(allowed: &[Vec<bool>], from: Values, to: Values) -> (bool, bool) {
     pairs.fold((false, false), |(may, may_not), allowed| (may || allowed, may_not || !allowed))
 }
 
-/// The cells on which timed rules depend: those that they read; those that decide whether what every step does
-/// happens; and those from which one of these is set.
+/// The cells on which timed rules depend. They are the cells that the rules read, the cells that decide whether the effects
+/// of every step happen, and the cells from which one of these is set.
 fn followed(space: &Space, in_force: &RulesInForce, timed: &[usize]) -> Vec<usize> {
     let mut found: Vec<usize> = Vec::new();
     for rule in in_force.all() {

@@ -136,7 +136,7 @@ impl<'a> RowText<'a> {
         format!("{} {:?}", call.manoeuvre, arguments.collect::<Vec<_>>())
     }
 
-    /// What the drawn values come from, and the rules.
+    /// The sources of the drawn values, and the rules.
     fn conditions(&self) -> String {
         let mut parts: Vec<String> = Vec::new();
         for parameter in self.space.actions[self.row.action].drawn() {

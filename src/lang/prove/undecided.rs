@@ -173,7 +173,7 @@ fn error(space: &Space, many: &[Unknown<'_>]) -> Diagnostic {
     })
 }
 
-/// What is not known of rules that leave rows undecided.
+/// The reason why rules leave rows undecided.
 fn why(rules: &[&RuleDef]) -> &'static str {
     match () {
         () if ask(rules, Known::Spawn) => "not found to hold for a newcomer",

@@ -37,9 +37,9 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     diagnostics
 }
 
-/// Values with which a row spawns within the stopping distance on a road; `None` if none are found, or if a
-/// rule asks the world, about the gap or the speed of the ego vehicle, and so decides by itself. What appears beside the
-/// middle of a lane need not be in the way, and how far somebody else is away nobody knows here.
+/// Values with which a row spawns within the stopping distance on a road; `None` if none are found. Also `None` if a rule
+/// asks the world, about the gap or the speed of the ego vehicle, and so decides by itself. A road user beside the middle
+/// of a lane need not be in the way, and the distance to another road user is not known here.
 fn unfair(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef, left: &Left) -> Option<Witness> {
     let in_force = RulesInForce::by_default(space);
     let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };

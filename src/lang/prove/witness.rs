@@ -4,9 +4,9 @@
 //! is taken to be empty: a spawn lands where it was asked to, and no gap is too small. A rule that asks more of the
 //! world than that holds at some moment, as far as is known here.
 //!
-//! Where a rule asks about a gap, or more is wished for than that the row runs, the search narrows the ranges by
-//! exact intervals, tries the ends and the middle of what is left, and halves the box where nothing fits. Values
-//! that this search does not find may still exist.
+//! If a rule asks about a gap, or the witness must meet a further wish, the search narrows the ranges by exact intervals.
+//! It tries the ends and the middle of the rest, and halves the box where nothing fits. Values that this search does not
+//! find may still exist.
 
 use std::cell::Cell;
 use std::collections::{BTreeSet, VecDeque};
@@ -65,7 +65,7 @@ pub fn witness(space: &Space, row: &Row, road: &Road) -> Option<Witness> {
     })
 }
 
-/// What is found of a row with one memory before it.
+/// The finding about a row with one memory before it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Found {
     /// Values of all its parameters with which it runs.
@@ -80,11 +80,11 @@ pub(super) enum Found {
 pub(super) struct Search<'a> {
     pub rules: RowRules<'a>,
     pub left: &'a Left,
-    /// What is known of the moment; `None`: any moment.
+    /// The known facts of the moment; `None`: any moment.
     pub moment: Option<&'a Case>,
 }
 
-/// What searches may still do; at 0 they find nothing more.
+/// The work left to searches; at 0 they find nothing more.
 pub(super) struct Left {
     /// Boxes to look at.
     boxes: Cell<usize>,
@@ -128,7 +128,7 @@ enum Place {
     Middle,
 }
 
-/// What is asked of a witness beyond the rules, given all parameters and the memory after.
+/// A wish beyond the rules, given all parameters and the memory after.
 pub(super) type Wish<'a> = dyn Fn(&[Value], &Memory) -> bool + 'a;
 
 impl Search<'_> {
@@ -148,7 +148,7 @@ impl Search<'_> {
         None
     }
 
-    /// What there is with this memory before the row.
+    /// The finding with this memory before the row.
     pub fn at(&self, memory: &Memory) -> Found {
         self.left.take_box();
         if self.asks_about_moment() && !self.may_run(&followed(memory)) {
@@ -164,7 +164,7 @@ impl Search<'_> {
         if self.left.is_spent() || tries.get() == 0 || effort::is_spent() {
             return Found::Unknown;
         }
-        // What is left to try are rules about the gap of the spawn, and its bounds.
+        // Only rules about the gap of the spawn, and its bounds, are left to try.
         let found = self.choices().iter().find_map(|chosen| self.numbers(chosen, memory, &|_, _| true));
         found.map_or(Found::Unknown, Found::Runs)
     }
@@ -240,7 +240,7 @@ impl Search<'_> {
         chosen
     }
 
-    /// What is chosen from lists, and the whole ranges of the open numbers.
+    /// The values chosen from lists, and the whole ranges of the open numbers.
     fn ranges(&self, chosen: &[Value], open: &[usize]) -> Vec<Values> {
         let mut ranges = points(chosen);
         for local in open {
@@ -316,15 +316,15 @@ impl Search<'_> {
             {
                 return false;
             }
-            // The spawn lands where it was asked to, and no gap is unfair. How far away somebody else is beside whom it is asked
-            // for, or a trajectory, nobody knows here.
+            // The spawn lands where it was asked to, and no gap is unfair. The distance to a trajectory, or to another road
+            // user beside which it spawns, is not known here.
             let is_elsewhere = spawn.of.is_some() || spawn.trajectory.is_some() || distance_m < 0.0;
             let spawn_gap_m = if is_elsewhere { f64::INFINITY } else { distance_m };
             spawns.push(SpawnFacts { spawn_gap_m, ..SpawnFacts::default() });
         }
         let world = WorldFacts { spawns, ..WorldFacts::default() };
         let candidate = Candidate { values, before, after, world: Some(&world) };
-        // What the moment or the place decides is not judged by this world, but by whether it may come.
+        // Conditions on the moment or the place are not judged by this world, but by whether they may come.
         self.rules.breaches(candidate).all(|breach| breach.asks_about_moment())
             && (!self.asks_about_moment() || self.is_left_open(candidate))
     }
@@ -336,7 +336,7 @@ impl Search<'_> {
     /// The states that one step with this row leads to, and whether there can be no other.
     pub fn successors(&self, memory: &Memory) -> (Vec<Memory>, bool) {
         let action = self.action();
-        // What every step sets is left out: a step without this row leads there too.
+        // The effects of every step are left out: a step without this row leads there too.
         let sets: Vec<&SetDef> = action.sets().collect();
         if sets.is_empty() {
             return (Vec::new(), true);
@@ -444,9 +444,9 @@ pub(super) fn points(values: &[Value]) -> Vec<Values> {
     values.iter().map(|value| Values::point(*value)).collect()
 }
 
-/// The cells of a memory to which an episode comes, each as the short fraction beside it. What was computed on the way is
-/// rounded: 0.3 - 0.1 - 0.1 is 0.09999999999999998, and a draw that takes 0.1 from that has 0, because it takes them for
-/// equal; a proof that took it for exact would have less.
+/// The cells of a memory that an episode reaches, each as the short fraction beside it. Computed values are rounded: 0.3 -
+/// 0.1 - 0.1 is 0.09999999999999998. A draw that takes 0.1 from it has 0, because it takes them for equal. A proof that
+/// took it for exact would have less.
 fn followed(memory: &Memory) -> Vec<Values> {
     let cell = |value: &Value| match value {
         Value::Number(number) => {

@@ -107,11 +107,11 @@ pub struct Item {
     pub span: Span,
 }
 
-/// Declares the kinds of declarations. A row is the kind, what it holds, its keyword, the method that gives
-/// what it holds (`None` for another kind), and the field of its name if it has one.
+/// Declares the kinds of declarations. A row has the kind, its content, its keyword, and the field of its name if it has
+/// one. It also has the method that gives the content (`None` for another kind).
 macro_rules! kinds {
     ($($kind:ident($declared:ty) $keyword:literal $as_kind:ident $($name:ident)?;)+) => {
-        /// What is declared.
+        /// A declaration by its kind.
         #[derive(Debug, Clone, PartialEq, Serialize)]
         pub enum ItemKind {
             $($kind($declared),)+
@@ -129,7 +129,7 @@ macro_rules! kinds {
                 }
             }
 
-            /// What the declaration is called, if it has a name.
+            /// The name of the declaration, if it has one.
             pub fn name(&self) -> Option<&Name> {
                 match self {
                     $($(ItemKind::$kind(declared) => Some(&declared.$name),)?)+
@@ -364,7 +364,7 @@ pub struct Spawn {
     pub bearers: Vec<Name>,
     pub place: Place,
     pub distance: Expr,
-    /// Whose distance it is; that to the ego vehicle without it.
+    /// The road user from which the distance is measured; the ego vehicle without it.
     pub of: Option<Name>,
     pub apart: Option<Expr>,
     pub cover: Option<Expr>,
@@ -372,7 +372,7 @@ pub struct Spawn {
 }
 
 impl Effect {
-    /// What the effect makes appear, if anything.
+    /// The spawn of the effect, if it is one.
     pub fn spawn(&self) -> Option<&Spawn> {
         match &self.kind {
             EffectKind::Spawn(spawn) => Some(spawn),
@@ -464,10 +464,10 @@ pub struct Require {
     pub when: Option<Expr>,
     /// The end of what began by `when`.
     pub until: Option<Expr>,
-    /// What must begin to hold for the condition to be asked.
+    /// The condition that must begin to hold before the requirement is asked.
     pub after: Option<Expr>,
     pub condition: Expr,
-    /// What excuses that the condition does not hold.
+    /// A condition that excuses a breach.
     pub unless: Option<Expr>,
     pub within: Option<Expr>,
 }
@@ -593,7 +593,7 @@ pub struct Policy {
     pub origin: Vec<Field>,
     /// The exact face, the network; empty if the file has none.
     pub net: Vec<Field>,
-    /// What the policy claims to achieve, with each face.
+    /// The results that the policy claims, with each face.
     pub claims: Vec<Field>,
     /// The readable face: the first line that applies acts. Empty if the file has none.
     pub rules: Vec<PolicyLine>,

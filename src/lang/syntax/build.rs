@@ -93,7 +93,7 @@ impl Builder {
         Ok(Text::new(value, span))
     }
 
-    /// What an `item` declares.
+    /// The declaration of an `item`.
     pub fn item(&self, pair: Pair<'_, Rule>) -> Built<ItemKind> {
         let declaration = pair.into_inner().next().expect("an item is one declaration");
         self.declaration(declaration)

@@ -1,8 +1,7 @@
-//! What a compiler says to an author: a code, a message, the places it is about, and what to do.
+//! The messages of the compiler: a code, a message, the places it is about, and what to do.
 //!
-//! Every stage that reads source text reports through these types; only this file knows how they
-//! are drawn. Codes are never reused or renumbered. The caller decides when to stop, and with which
-//! exit status.
+//! Every stage that reads source text reports through these types; only this file knows how they are drawn. Codes are never
+//! reused or renumbered. The caller decides when to stop, and with which exit status.
 
 use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 use serde::Serialize;
@@ -40,7 +39,7 @@ pub struct Diagnostic {
     pub labels: Vec<Label>,
     /// Facts that belong to no place.
     pub notes: Vec<String>,
-    /// What to do about it.
+    /// Advice to the author.
     pub help: Option<String>,
     /// Changes that a tool may make: each of them alone removes the mistake.
     pub fixes: Vec<Fix>,
@@ -49,9 +48,9 @@ pub struct Diagnostic {
 /// A change of one place of the source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fix {
-    /// What the change does, as a command: ``write `drive_ahead` ``.
+    /// The effect of the change, as a command: ``write `drive_ahead` ``.
     pub title: String,
-    /// What is replaced; an empty span inserts.
+    /// The replaced text; an empty span inserts.
     pub span: Span,
     pub text: String,
 }
@@ -243,8 +242,8 @@ const DRAWN_MAX: usize = 20_000;
 /// Most labels that are drawn of one diagnostic in one file.
 const LABELS_MAX: usize = 40;
 
-/// The labels of a diagnostic in one file, grouped by nearness. The group of the mistake comes first, the others in the order
-/// of the text.
+/// The labels of a diagnostic in one file, grouped by nearness. The group of the mistake comes first, the others in the
+/// order of the text.
 fn pieces(diagnostic: &Diagnostic, file: FileId) -> Vec<Vec<&Label>> {
     let of_file = diagnostic.labels.iter().filter(|label| label.span.file == file);
     let mut labels: Vec<&Label> = of_file.take(LABELS_MAX).collect();

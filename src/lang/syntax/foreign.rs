@@ -10,7 +10,7 @@ use avastra_base::units::unit;
 #[derive(Debug)]
 pub struct Failure {
     pub at: usize,
-    /// What was expected there, in the author's words.
+    /// The words expected there, as the author knows them.
     pub expected: Vec<&'static str>,
     /// Whether an expression could have gone on there.
     pub continues: bool,
@@ -28,7 +28,7 @@ pub struct Foreign {
     /// Where it stands.
     pub start: usize,
     pub end: usize,
-    /// What is wrong with it; `None` if it is a mark of this language, too, and only stands in the wrong place.
+    /// The mistake; `None` if it is a mark of this language, too, and only stands in the wrong place.
     pub message: Option<String>,
     pub help: String,
     /// A change of one place that removes the mistake: from, to, and the text to write there.
@@ -74,7 +74,7 @@ pub fn foreign(text: &str, token: usize, same_line: bool, failure: &Failure) -> 
     })
 }
 
-/// What to do about a word, and what to write in its place where that is enough.
+/// Advice about a word, and its replacement where that is enough.
 type Meant = (String, Option<&'static str>);
 
 fn of_word(text: &str, (start, end): (usize, usize), (help, instead): Meant) -> Option<Foreign> {
@@ -82,7 +82,7 @@ fn of_word(text: &str, (start, end): (usize, usize), (help, instead): Meant) -> 
     Some(Foreign { start, end, message, help, fix: instead.map(|instead| (start, end, instead.to_owned())) })
 }
 
-/// What a mark of other languages is in this one, where it stands in its place.
+/// The mark of this language for a mark of another one, where it stands in its place.
 fn of_mark(text: &str, mark: &str, start: usize, failure: &Failure) -> Option<Foreign> {
     let end = start + mark.len();
     let is_ours = matches!(mark, "=>" | "->" | "==" | "=" | ":" | "|");
@@ -143,10 +143,10 @@ pub fn foreign_declaration(word: &str) -> Option<&'static str> {
     })
 }
 
-/// What stands in place of `if … then … else …`.
+/// The replacement of `if … then … else …`.
 const CHOICE: &str = "`match` chooses a value: `match near { true => 3 m, false => 9 m }`";
 
-/// What stands in place of `if` and `else` in a list of cases.
+/// The replacement of `if` and `else` in a list of cases.
 const CASES: &str =
     "the first case that holds counts: write `condition => value`, and `_ => value` for the rest";
 
@@ -267,8 +267,8 @@ fn percent_of_nothing(text: &str, token: usize, failure: &Failure) -> Option<For
     })
 }
 
-/// `5. m/s`: the point after which a number ends, which the grammar has taken for that of a part. `end` is where the last token
-/// before the failure ends.
+/// `5. m/s`: the point after which a number ends, which the grammar has taken for that of a part. `end` is where the last
+/// token before the failure ends.
 pub fn bare_point(text: &str, end: usize, failure: &Failure) -> Option<Foreign> {
     let number = text[..end].strip_suffix('.').filter(|_| failure.expects(NAME))?;
     let from = number.rfind("..").map_or(0, |range| range + "..".len());
@@ -320,7 +320,7 @@ fn is_in_word(letter: char) -> bool {
 mod tests {
     use super::*;
 
-    /// What is said where a text fails at a byte, and what is written there.
+    /// The message where a text fails at a byte, and the text that is written there.
     fn said(
         text: &str,
         at: usize,

@@ -54,7 +54,7 @@ fn loose_comments(tree: &File, text: &str) -> Vec<Comment> {
 }
 
 fn comment_texts<'a>(comments: &[Comment], text: &'a str) -> Vec<&'a str> {
-    // The marks may change: what stood at the end of a line is no documentation on a line of its own.
+    // The marks may change: a comment at the end of a line is no documentation on a line of its own.
     let said = |comment: &Comment| text[comment.start..comment.end].trim_start_matches(['/', '!']);
     let mut texts: Vec<&str> = comments.iter().map(said).collect();
     texts.sort_unstable();

@@ -29,22 +29,22 @@ pub fn lone_item(text: &str) -> Result<Pairs<'_, Rule>, (usize, Vec<Rule>)> {
     })
 }
 
-/// What an author calls a name.
+/// The author's word for a name.
 pub const NAME: &str = "a name";
-/// What is expected where an action may go on.
+/// Expected where an action may go on.
 pub const EFFECT: &str = "an effect like `set time = to`";
-/// What is expected where more effects may go on, which only set states.
+/// Expected where more effects may go on, which only set states.
 pub const ONLY_SET: &str = "an effect like `set count = count + 1`";
-/// The words that effects begin with; the first is that of those which only set states.
+/// The words that effects begin with; `set` comes first, for places where effects only set states.
 pub const EFFECTS: &[&str] = &["set", "spawn", "order"];
-/// What is expected where a transition names a value.
+/// Expected where a transition names a value.
 pub const VARIANT: &str = "a variant";
 
-/// What a rule is to the parser and to its messages.
+/// The role of a rule for the parser and for its messages.
 #[derive(Debug, Clone, Copy)]
 pub enum Role {
     Operator(Operator),
-    /// What an author calls it, in a sentence that begins "expected …".
+    /// The author's word for it, in a sentence that begins "expected …".
     Said(&'static str),
     /// Possible in so many places that naming it would not help.
     Unsaid,
@@ -232,7 +232,7 @@ pub fn role(rule: Rule) -> Role {
     }
 }
 
-/// What an author calls a rule; `None` for rules that are never named.
+/// The author's word for a rule; `None` for rules that are never named.
 pub fn words(rule: Rule) -> Option<&'static str> {
     match role(rule) {
         Role::Said(words) => Some(words),
@@ -269,7 +269,8 @@ pub fn opening_words(rule: Rule) -> Vec<&'static str> {
 }
 
 /// Whether the rule is a mark or keyword that the tree does not keep, because the rule around it tells
-/// which one it was. Rules are ordered as they stand in the grammar, where marks and keywords stand together; a test keeps that.
+/// which one it was. Rules are ordered as they stand in the grammar, where marks and keywords stand together; a test keeps
+/// that.
 pub fn is_plain_terminal(rule: Rule) -> bool {
     let is_kept = matches!(
         rule,

@@ -145,7 +145,7 @@ pub fn keywords() -> impl Iterator<Item = &'static Keyword> {
     [DECLARATIONS, CLAUSES, OPERATORS, LITERALS].into_iter().flatten()
 }
 
-/// What a keyword means.
+/// The meaning of a keyword.
 pub fn meaning(word: &str) -> Option<&'static str> {
     keywords().find(|(known, _)| *known == word).map(|(_, meaning)| *meaning)
 }

@@ -1,8 +1,8 @@
 //! Parses a text into a tree, and reports every mistake that can be told from the others.
 //!
-//! pest stops at the first mistake. So a text that fails is read again with a rule that sets aside
-//! what it cannot read, up to the next line that begins a declaration. Each slice set aside is then
-//! read alone, for a message of its own. The tree holds everything that could be read.
+//! pest stops at the first mistake. So a failing text is read again with a rule that sets aside the parts that it cannot
+//! read, up to the next line that begins a declaration. Each slice set aside is then read alone, for a message of its own.
+//! The tree holds everything that could be read.
 
 use pest::Parser;
 use pest::iterators::Pair;
@@ -33,7 +33,7 @@ pub const LANGUAGE: u64 = 1;
 /// Most mistakes that are reported for one file.
 const DIAGNOSTICS_MAX: usize = 100;
 
-/// What is expected where nothing better is known.
+/// Expected where nothing better is known.
 const DECLARATION: &str = "a declaration";
 
 fn declarations() -> impl Iterator<Item = &'static str> {
@@ -413,7 +413,7 @@ fn is_condition_after_head(expected: &[&str], found: &str) -> bool {
     is_head && is_condition && nearest(found, ["on", "during"]).is_none()
 }
 
-/// What was expected, in the author's words.
+/// The expected rules, in the author's words.
 fn in_words(rules: &[Rule]) -> Vec<&'static str> {
     let mut expected = Vec::new();
     let each = |rule: &Rule| match rule {

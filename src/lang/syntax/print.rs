@@ -17,8 +17,8 @@ use crate::syntax::print_expression::{
 };
 use crate::syntax::scan::Comment;
 
-/// The text of a tree that was built, not read: documentation is in the tree, other comments do not
-/// exist. What it prints reads back to the same tree.
+/// The text of a tree that was built, not read: documentation is in the tree, other comments do not exist. The text reads
+/// back to the same tree.
 pub fn print(file: &File) -> String {
     print_with(file, "", &[])
 }
@@ -513,7 +513,7 @@ impl Printer<'_> {
             self.words(":");
             self.value(&item.condition);
         } else {
-            // What does not fit on one line has a line for each of them, and for the condition.
+            // A list too long for one line has a line for each of its entries, and for the condition.
             parts.extend([Layout::text(":"), Layout::Line(" "), expression(&item.condition)]);
             self.put(&Layout::group([Layout::nest(parts)]));
         }

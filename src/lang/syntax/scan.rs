@@ -32,7 +32,7 @@ impl Comment {
     }
 }
 
-/// What one pass finds.
+/// The findings of one pass.
 #[derive(Debug, Default)]
 pub struct Scan {
     /// In the order of the text.

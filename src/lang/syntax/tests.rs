@@ -1,5 +1,5 @@
 //! Hostile inputs and round trips: the parser always ends with a message, and the printer loses nothing.
-//! What it says of each mistake is tested by `tests/cases/diagnostics`, the layout by `tests/cases/format`.
+//! `tests/cases/diagnostics` tests the message for each mistake, `tests/cases/format` the layout.
 
 use proptest::prelude::*;
 

@@ -1,8 +1,8 @@
 //! A declaration that breaks off where an author is typing: what the grammar expects there, and the tree that the
 //! declaration has once the shortest text ends it.
 //!
-//! The grammar decides both. A name of our own, [`HERE`], is put at the place; then, as long as the declaration does
-//! not parse, one of the tokens is added that pest says would go on. Text behind the place is ignored.
+//! The grammar decides both. A name of our own, [`HERE`], is put at the place. While the declaration does not parse, one of
+//! the tokens is added that pest expects. Text behind the place is ignored.
 
 use pest::Parser;
 
@@ -21,7 +21,7 @@ const ADDED_MAX: usize = 96;
 /// A longer declaration was written by a program. Completion would read it several times, so nothing is said of it.
 const BYTES_MAX: usize = 200_000;
 
-/// What ends a declaration soonest, by the rule that is expected: the first that fits is added.
+/// The tokens that end a declaration soonest, by the rule that is expected: the first that fits is added.
 const ENDINGS: &[(Rule, &str)] = &[
     (Rule::close_brace, "}"),
     (Rule::close_paren, ")"),
@@ -57,7 +57,7 @@ const ENDINGS: &[(Rule, &str)] = &[
     (Rule::arguments, "()"),
 ];
 
-/// What stands at a place of a text.
+/// The context of a place in a text.
 #[derive(Debug, Default)]
 pub struct Unfinished {
     /// Where the word or the text literal at the place begins. A proposal replaces the text from here to the place.
@@ -73,7 +73,7 @@ pub struct Unfinished {
     pub tree: Option<ItemKind>,
 }
 
-/// What stands at a byte of a text. Empty within a comment.
+/// The context of a byte in a text. Empty within a comment.
 pub fn unfinished(text: &str, byte: usize) -> Unfinished {
     let byte = text.floor_char_boundary(byte.min(text.len()));
     let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';

@@ -1,4 +1,4 @@
-//! What is wrong with a settings file in YAML, in words for its author: line, field, and what is allowed.
+//! Mistakes in a settings file in YAML, in words for its author: line, field, and what is allowed.
 
 use super::diagnostic::listed;
 use super::nearest;
@@ -32,8 +32,8 @@ pub fn yaml_mistake(error: &serde_yaml::Error, text: &str) -> String {
     format!("line {line}: {}", settings_mistake(what, field.filter(is_word)))
 }
 
-/// What is wrong with settings, in words for their author, where a reader said so in words of its own; `field` is the key
-/// of the line. What is none of a reader's sentences is a sentence of ours and stays.
+/// Rewrites the message of a YAML reader about a mistake in settings, in words for the author; `field` is the key of the
+/// line. Any other message is already ours and stays.
 pub fn settings_mistake(what: &str, field: Option<&str>) -> String {
     let of_field = |text: String| field.map_or(text.clone(), |field| format!("`{field}`: {text}"));
     let unknown = what.strip_prefix("unknown field `").or(what.strip_prefix("unknown variant `"));
@@ -58,7 +58,7 @@ pub fn settings_mistake(what: &str, field: Option<&str>) -> String {
     {
         return of_field(format!("write {}", wanted(expected)));
     }
-    // What is wrong with the layout comes first: `invalid indentation` begins as `invalid i64` does.
+    // The layout comes first: `invalid indentation` begins as `invalid i64` does.
     said(LAYOUT, |part| what.contains(part))
         .or_else(|| said(VALUES, |begin| what.starts_with(begin)).map(of_field))
         .unwrap_or_else(|| what.to_owned())
@@ -132,7 +132,7 @@ const LAYOUT: &[Said] = &[
 
 fn no_such(name: &str, known: &str) -> String {
     let known = known.trim_start_matches("one of ").split([',', ' ']).map(|name| name.trim_matches('`'));
-    // Of two names, the reader says "`a` or `b`".
+    // With two known names, the reader says "`a` or `b`".
     let known: Vec<&str> = known.filter(|name| !matches!(*name, "" | "or")).collect();
     match nearest(name, known.iter().copied()) {
         Some(near) => format!("there is no `{name}`; did you mean `{near}`?"),
@@ -140,7 +140,7 @@ fn no_such(name: &str, known: &str) -> String {
     }
 }
 
-/// What a reader expects, in the author's words. Our own types say themselves what they are.
+/// The value that a reader expects, in the author's words. Our own types say themselves what they are.
 fn wanted(expected: &str) -> &str {
     let is_sized = |kind: char| {
         expected.strip_prefix(kind).is_some_and(|rest| rest == "size" || rest.parse::<u8>().is_ok())
@@ -162,7 +162,7 @@ fn wanted(expected: &str) -> &str {
     }
 }
 
-/// What a reader found, in the author's words: `` the text `fast` ``.
+/// The value that a reader found, in the author's words: `` the text `fast` ``.
 fn found_in_words(found: &str) -> String {
     match found {
         "sequence" => "a list".to_owned(),

@@ -38,7 +38,7 @@ pub struct RoadElement {
     pub objects: Vec<ObjectElement>,
 }
 
-/// What a road's beginning or end touches.
+/// The element that a road's beginning or end touches.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RoadLink {
     Road { id: String, contact: Contact, line: u32 },
@@ -52,7 +52,7 @@ pub enum Contact {
     End,
 }
 
-/// What a record says of the speed.
+/// The speed limit of a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Limit {
     /// m/s.
@@ -79,7 +79,7 @@ pub struct SectionElement {
     pub lanes: Vec<LaneElement>,
 }
 
-/// What holds on a lane: its limit, whether its road is a motorway, and whether it is for buses.
+/// The rules of a lane: its limit, whether its road is a motorway, and whether it is for buses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Holds {
     pub limit: Limit,
@@ -98,16 +98,16 @@ pub struct LaneElement {
     pub line: u32,
     /// Why no car drives on it, in one direction; `None` for a driving lane.
     pub undriven: Option<LeftOut>,
-    /// What holds on it; unknown until `cut` has found it.
+    /// The rules of the lane; unknown until `cut` has found them.
     pub holds: Holds,
-    /// What a lane that is no driving lane is to people on foot.
+    /// The use of a lane by pedestrians, if it is no driving lane.
     pub beside: Option<StripKind>,
     /// Width over the distance from the section's begin.
     pub widths: Cubics,
     pub borders: Cubics,
     pub predecessors: Vec<i32>,
     pub successors: Vec<i32>,
-    /// Limits of its own, each from a distance on from the section's beginning, m, by rising distance.
+    /// The lane's own limits, each from a distance on from the section's beginning, m, by rising distance.
     pub speeds: Vec<(f64, Limit)>,
     /// In the same way, whether it is for buses.
     pub buses: Vec<(f64, bool)>,
@@ -183,7 +183,7 @@ pub struct ObjectElement {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ObjectKind {
     Crosswalk,
-    /// A building, a wall, a tree: nobody walks through it.
+    /// A building, a wall or a tree, which pedestrians do not walk through.
     Solid,
 }
 
@@ -229,7 +229,7 @@ impl LaneElement {
     pub fn between(&self, from_m: f64, to_m: f64) -> LaneElement {
         let marks = self.marks.iter().filter(|mark| mark.begin_m < to_m);
         let marks = marks.map(|mark| MarkElement { begin_m: mark.begin_m - from_m, ..*mark });
-        // Of the marks that have begun, the last one holds.
+        // The last mark that has begun holds.
         let mut marks: Vec<MarkElement> = marks.collect();
         let begun = marks.partition_point(|mark| mark.begin_m <= 0.0);
         marks.drain(..begun.max(1) - 1);
@@ -268,7 +268,7 @@ impl RoadElement {
         (lane < 0) != self.left_hand
     }
 
-    /// What decides where a lane of a section lies.
+    /// The widths and offsets that decide where a lane of a section lies.
     pub fn across<'a>(&'a self, section: &'a SectionElement, lane: i32) -> Across<'a> {
         let side = lane.signum();
         let lanes = (1..=lane.abs()).map(|id| section.lane(id * side)).collect();

@@ -32,7 +32,7 @@ const CORNER_RAD_MAX: f64 = 60.0 * core::f64::consts::PI / 180.0;
 /// Pieces shorter than twice this are rounding of the tool that wrote them: their angles say nothing, m.
 const CORNER_M_MIN: f64 = 5e-4;
 
-/// A corner is rounded with this radius, m, or a smaller one where there is less room: each piece gives at most
+/// A corner is rounded with this radius, m, or a smaller one where there is less room. Each piece gives at most
 /// half of its length, and the line stays within [`ROUNDED_M_MAX`] of the corner.
 const ROUNDING_RADIUS_M: f64 = 100.0;
 const ROUNDED_M_MAX: f64 = 0.5;

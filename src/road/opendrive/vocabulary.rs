@@ -74,7 +74,7 @@ const NOTED: &str = "
     objects.objectReference road.railroad signal.semantics signal.vmsBoard
 ";
 
-/// What a map says that may change what it means and is not read, in words, each as often as it stands there.
+/// Elements and attributes of a map that may change its meaning and are not read, in words, each as often as it occurs.
 pub fn unread<'a>(root: Node<'a, '_>) -> impl Iterator<Item = String> + 'a {
     let mut attributes: BTreeMap<(&str, &str), Vec<&str>> = BTreeMap::new();
     for row in ELEMENTS.split(';') {

@@ -1,4 +1,4 @@
-//! What lies beside a lane: on its own road, across a median, in a junction.
+//! The lanes beside a lane: on its own road, across a median, in a junction.
 
 use crate::abreast::{Abreast, Opposing};
 use crate::testing::{lanes, street};
@@ -102,7 +102,7 @@ fn without_a_median_the_neighbour_is_the_opposing_lane() {
     assert_eq!(map.opposing(one_way.lane, one_way.station_m), None);
 }
 
-/// What [`RoadMap::opposing`] finds, from all that is abreast, however far away.
+/// The result of [`RoadMap::opposing`], from all that is abreast, however far away.
 fn opposing_of_all(map: &RoadMap, lane: LaneIndex, station_m: f64) -> Option<Opposing> {
     let own = map.lane(lane);
     let side = if own.keeps_left { -1.0 } else { 1.0 };

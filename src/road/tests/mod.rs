@@ -1,5 +1,5 @@
-//! Tests of the whole module on made-up maps and on shipped ones. What was surveyed of the shipped maps is
-//! tested by `tests/it/surveys.rs`.
+//! Tests of the whole module on made-up maps and on shipped ones. `tests/it/surveys.rs` tests the surveyed
+//! facts of the shipped maps.
 
 mod abreast;
 mod changes;

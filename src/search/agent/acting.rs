@@ -1,4 +1,4 @@
-//! What an agent is.
+//! The interface of agents.
 
 use ndarray::{Array1, ArrayView1, aview1};
 
@@ -6,7 +6,7 @@ use crate::mdp::Observation;
 use avastra_base::rng::Rng;
 use avastra_world::action::RowOdds;
 
-/// Which rows are legal now. To judge one takes time, so that who needs a few asks for these alone.
+/// Which rows are legal now. To judge a row takes time, so that an agent that needs a few asks for these alone.
 pub trait Mask {
     /// Whether a row is legal.
     fn is_legal(&mut self, row: usize) -> bool;
@@ -23,7 +23,7 @@ pub trait Mask {
     }
 }
 
-/// What is known of all rows already.
+/// A mask that is known for all rows already.
 impl Mask for Vec<bool> {
     fn is_legal(&mut self, row: usize) -> bool {
         self[row]

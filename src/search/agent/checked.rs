@@ -68,7 +68,7 @@ pub(super) fn record(settings: &impl Serialize) -> Map<String, Value> {
     }
 }
 
-/// What a setting must be, and whether it is.
+/// A requirement of a setting, and whether it is met.
 pub(super) struct Requirement {
     pub name: &'static str,
     pub is_met: bool,

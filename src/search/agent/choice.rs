@@ -1,4 +1,4 @@
-//! What an agent sees and may choose.
+//! The observation and the choices of an agent.
 
 use avastra_lang::model::EffectDef;
 use avastra_world::action::ActionTable;
@@ -6,7 +6,7 @@ use avastra_world::action::ActionTable;
 use super::checked::{SettingsError, hint};
 use super::features::{Encoding, StateSet};
 
-/// What the agent sees and may do.
+/// The state variables and actions of the agent.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ChoiceSettings {
     /// State variables that the agent sees (RQ2).
@@ -25,7 +25,7 @@ pub struct ChoiceSettings {
     pub environment_gate_steps: u32,
 }
 
-/// What an agent knows about the rows before any episode.
+/// An agent's knowledge of the rows before any episode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rows {
     /// Whether the agent may choose the row at all, shape `(rows,)`.

@@ -103,7 +103,7 @@ impl Learner {
         bytes.is_at_end().then_some(self)
     }
 
-    /// What acts after the training.
+    /// The policy that acts after the training.
     fn trained(&self) -> &QPolicy {
         self.average.as_ref().unwrap_or(&self.policy)
     }

@@ -7,7 +7,7 @@ use super::trajectory::Trajectory;
 /// A transition for each step: the discounted rewards of the next `n_step` steps, and the state after them.
 ///
 /// `rewards` has shape `(steps,)`. Near the end fewer rewards are left. The value of the last state does not
-/// count where the episode ended of its own; an episode that was cut off is bootstrapped from it.
+/// count where the episode ended by itself. An episode that was cut off is bootstrapped from it.
 pub(super) fn transitions(episode: &Trajectory, rewards: &[f64], policy: &QPolicy) -> Vec<Transition> {
     let (settings, count) = (policy.settings(), episode.steps.len());
     debug_assert_eq!(rewards.len(), count);

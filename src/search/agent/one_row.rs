@@ -28,7 +28,7 @@ impl Agent for OneRow {
     }
 
     fn choose(&mut self, _: &Observation, legal: &mut dyn Mask, _: &mut Rng) -> Option<usize> {
-        // Of its own row a run tells in how many steps it could be, and why not.
+        // A run tells in how many steps its row could be chosen, and why not in the others.
         legal.is_legal(self.rows[0]);
         let chosen = self.open.iter().position(|row| legal.is_legal(*row))?;
         let row = self.open.remove(chosen);

@@ -45,8 +45,8 @@ pub(super) fn of_record(recorded: &Map<String, Value>) -> Result<LearnerSettings
     changed(&base, recorded.clone())
 }
 
-/// The paper as printed. What it leaves open is as in its published package, but for that package's
-/// faults; how long ε falls is DeepCollision's, which the paper refers to.
+/// The paper as printed. Settings that it leaves open are as in its published package, but for that package's
+/// faults. How long ε falls is DeepCollision's, which the paper refers to.
 pub(super) fn paper() -> LearnerSettings {
     LearnerSettings {
         preset: "paper".to_owned(),

@@ -129,7 +129,7 @@ impl QPolicy {
         rows.map(|(row, (&allowed, candidate))| allowed && candidate && passes(row)).collect()
     }
 
-    /// What each step of an episode earns, shape `(steps,)`, as the settings pay it.
+    /// The reward of each step of an episode by the settings, shape `(steps,)`.
     pub(super) fn rewards(&self, episode: &Trajectory) -> Vec<f64> {
         let payment = &self.settings.payment;
         match payment.pays_maker {

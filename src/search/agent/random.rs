@@ -194,7 +194,7 @@ mod tests {
         }
         let asked: u32 = half.1.iter().sum();
         assert!((150..260).contains(&asked), "{asked} of 100,000");
-        // Of one in a thousand, all are asked for in nearly each step, and it comes.
+        // With one legal row in a thousand, all rows are asked for in nearly each step, and that row is chosen.
         let mut rare = Asked((0..1000).map(|row| row == 7).collect(), vec![0; 1000]);
         for _ in 0..20 {
             assert_eq!(agent.choose(&Observation::zeros(), &mut rare, &mut rng), Some(7));
@@ -215,7 +215,7 @@ mod tests {
             ([true; 5], [0.05, 0.05, 0.05, 0.2125, 0.6375]),
             // One of its rows has all of an action's rate; the share of what is not legal is the others'.
             ([true, false, false, false, true], [0.1, 0.0, 0.0, 0.0, 0.9]),
-            // What is left is no action.
+            // The remaining share is no action.
             ([false, false, true, false, false], [0.0, 0.0, 0.05, 0.0, 0.0]),
         ] {
             let legal = Array1::from_vec(legal.to_vec());

@@ -125,7 +125,7 @@ fn lines(text: &str) -> Result<Map<String, Value>, SettingsError> {
     }
 }
 
-/// Of a name that is no setting of an agent: which agents have it, if there are any.
+/// For a name that is no setting of an agent: which agents have it, if there are any.
 fn elsewhere(error: SettingsError) -> SettingsError {
     let SettingsError::Unknown { name, hint } = error else { return error };
     let default = |entry: &Entry| match &entry.kind {

@@ -1,4 +1,4 @@
-//! What learners and searches have in common: they get better from episode to episode.
+//! The common interface of learners and searches: both get better from episode to episode.
 
 use std::sync::Arc;
 
@@ -36,7 +36,7 @@ pub trait Trainable: Agent {
         1.0
     }
 
-    /// What it has learned, ready to act for one episode on any start.
+    /// The learned agent, ready to act for one episode on any start.
     fn actor(&self) -> Box<dyn Agent>;
 
     /// The same, but at each choice it is shown the state of another episode, drawn from the last ones of the training;
@@ -45,7 +45,7 @@ pub trait Trainable: Agent {
         None
     }
 
-    /// What it has learned as a network, if there is one.
+    /// The learned network, if there is one.
     fn policy(&self) -> Option<&QPolicy> {
         None
     }
@@ -54,7 +54,7 @@ pub trait Trainable: Agent {
     fn save(&self) -> Vec<u8>;
 }
 
-/// What the settings of every agent can do.
+/// The interface of every agent's settings.
 pub(super) trait Configured: Checked {
     type Trained: Trainable;
 

@@ -1,4 +1,4 @@
-//! What a learning agent is told of an episode when it has ended.
+//! The record of an ended episode that a learning agent is given.
 //!
 //! Learning waits for the end, because only then it is known which collisions count. It costs a lag of one
 //! episode, and between two episodes nothing is under way, so that a checkpoint is complete.
@@ -11,11 +11,11 @@ use crate::mdp::Observation;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     pub steps: Vec<Experience>,
-    /// What the agent would have seen next.
+    /// The observation that the agent would have seen next.
     pub last: Observation,
     /// Rows that would have been legal then, shape `(rows,)`.
     pub last_legal: Array1<bool>,
-    /// Whether the episode came to an end of its own (arrival), as opposed to being cut off.
+    /// Whether the episode ended by itself (arrival), as opposed to being cut off.
     pub terminal: bool,
 }
 
@@ -34,7 +34,7 @@ pub struct Experience {
     pub crashes: Vec<Option<usize>>,
 }
 
-/// What an agent did to learn from an episode.
+/// The updates with which an agent learned from an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Lesson {
     pub updates: u64,
@@ -49,7 +49,7 @@ impl Trajectory {
     }
 }
 
-/// What the tests of agents are made of: nothing is seen, nothing comes near.
+/// Experiences for the tests of agents: nothing is seen, nothing comes near.
 #[cfg(test)]
 impl Experience {
     pub fn plain(row: usize, reward: f64, rows: usize) -> Experience {

@@ -1,9 +1,9 @@
 //! Collision probability (ProC): how near the ego vehicle is to a crash, in `[0, 1]`.
 //!
-//! Paper, "Collision Probability Measurement", Eqs. 9–16, with these repairs:
-//! distances are between outlines, so that ProC reaches 1 at contact; decelerations are magnitudes;
-//! a safety distance is never below the least gap; oncoming traffic adds its own braking distance.
-//! ProC is a ratio of distances, not the probability of anything; the name is the paper's.
+//! Paper, "Collision Probability Measurement", Eqs. 9–16, with repairs. Distances are between outlines, so
+//! that ProC reaches 1 at contact. Decelerations are magnitudes. A safety distance is never below the least
+//! gap. Oncoming traffic adds its own braking distance. ProC is a ratio of distances, not the probability of
+//! anything; the name is the paper's.
 
 use avastra_base::geometry::wrap_angle;
 use avastra_base::kinematics::braking_m;
@@ -30,7 +30,7 @@ pub enum ProcKind {
     Avastra,
     /// The paper's equations, repaired only where they cannot be computed.
     Paper,
-    /// What the published package computes: [`super::released_probability`].
+    /// The value that the published package computes: [`super::released_probability`].
     Released,
 }
 

@@ -165,7 +165,7 @@ impl Seen {
 }
 
 /// The least post-encroachment time of an episode: from when one road user leaves a place where ways cross until the other
-/// comes. Requirements ask at every tick how long ago somebody left the place (`sim::Encroachment`); here the world is
+/// comes. Requirements ask at every tick how long ago a road user left the place (`sim::Encroachment`). Here the world is
 /// looked at every 0.1 s, and only ways that cross count.
 #[derive(Debug, Clone, Default)]
 pub struct LeastEncroachment {

@@ -1,8 +1,8 @@
 //! The Markov decision process of the paper: its 19 state variables, the collision probability and the
 //! reward.
 //!
-//! `criticality` has the usual measures of danger beside them. A space may define a reward of its own
-//! (`reward { … }`), which `model` evaluates.
+//! `criticality` has the usual measures of danger beside them. A space may define its own `reward { … }`,
+//! which `model` evaluates.
 
 mod collision_probability;
 mod criticality;

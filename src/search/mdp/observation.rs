@@ -1,4 +1,4 @@
-//! What an agent sees: the paper's 19 state variables, and what other agents need beside them.
+//! An agent's observation: the paper's 19 state variables, and those that other agents need beside them.
 //!
 //! DeepCollision's state is the ego vehicle's pose, the weather and the clock. The rest is ours: where
 //! the nearest obstacle is and how it moves, and where on its way the ego vehicle is; the paper's
@@ -24,7 +24,7 @@ const LOOK_AHEAD_M: f64 = 100.0;
 /// user that is older, or that there is none.
 const LOOK_AHEAD_S: f64 = 60.0;
 
-/// What an agent sees at one moment.
+/// An agent's observation of one moment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observation {
     /// The paper's variables, shape `(STATE_LEN,)`.

@@ -1,10 +1,10 @@
 //! Collision probability as the published package computes it, its faults included.
 //!
 //! Read from iSE-UET-VNU/AVASTRA and DeepCollision, re-implemented. Distances are between centres, so that
-//! ProC can be small at a contact; the difference of braking distances is taken without its sign, so that
-//! a gap that opens looks as dangerous as one that closes; the slopes of the velocities, and not the map,
-//! decide which vehicles share a lane; and ProC is computed twice a second. One thing differs from the
-//! package: obstacles that have been hit already are left out, as in our own ProC.
+//! ProC can be small at a contact. The difference of braking distances is taken without its sign, so that a
+//! gap that opens looks as dangerous as one that closes. The slopes of the velocities, and not the map,
+//! decide which vehicles share a lane. ProC is computed twice a second. One thing differs from the package:
+//! obstacles that have been hit already are left out, as in our own ProC.
 
 use avastra_base::geometry::Vec2;
 use avastra_world::sim::World;

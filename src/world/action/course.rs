@@ -36,7 +36,7 @@ impl Course {
     pub(super) fn new(parts: Arc<[Part]>, part: usize, later: Later) -> Course {
         let Part { manoeuvre, definition, .. } = &parts[part];
         let moment = LaterMoment::default();
-        // It asks for no moment. What has no value counts as once.
+        // It asks for no moment. A `repeat` without a value counts as once.
         let times = definition.repeat.as_ref().map_or(1.0, |times| later.value(times, &moment).number());
         let times = times.clamp(*REPEAT.start(), *REPEAT.end()).max(*REPEAT.start()) as usize;
         Course { manoeuvre: *manoeuvre, parts, part, times, later }
@@ -150,8 +150,7 @@ impl Course {
         Some(self.later.value(speed, moment).number()).filter(|mps| !mps.is_nan())
     }
 
-    /// What a phase tells the road user, within what an order may say; `None` if a figure has no value that it cannot go
-    /// without.
+    /// The command of a phase to the road user, within the bounds of orders; `None` if a needed figure has no value.
     pub fn command(&self, phase: usize, moment: &LaterMoment) -> Option<Command> {
         self.later.command(&self.phase(phase).command, moment).within_bounds()
     }

@@ -26,8 +26,8 @@ use avastra_lang::model::{
     locals, reached, rounded_into, spawn_distance_m, told,
 };
 
-/// Draws of one row in a step before the row is refused. Every draw obeys what can be known before; a further one
-/// is made only if the world has no place for the spawn, or a rule about its gap refuses that place.
+/// Draws of one row in a step before the row is refused. Every draw obeys what can be known before. A further draw is
+/// made only if the world has no place for the spawn, or a rule about its gap refuses that place.
 const DRAWS_MAX: usize = 16;
 
 /// One row in one situation.
@@ -42,7 +42,7 @@ pub(super) struct Judge<'a> {
     bearers: Vec<(usize, NpcFacts)>,
 }
 
-/// Why there is no place beside somebody else.
+/// Why there is no place beside another road user.
 const ABSENT: &str = "the road user beside whom it would appear is not there";
 const PASSED: &str = "that place is on the other side of the ego vehicle";
 
@@ -214,7 +214,7 @@ impl<'a> Judge<'a> {
             return Err(refusals);
         }
         let courses = self.courses(values, &after, &written);
-        // What every step changes comes without a question: it is no action, and not the world's to refuse.
+        // Changes by `each_step` come without a question: they are no action, and not the world's to refuse.
         for effect in Effect::of_change(self.row.space, before, &after) {
             if !effects.contains(&effect) {
                 effects.push(effect);
@@ -254,7 +254,7 @@ impl<'a> Judge<'a> {
         calls.map(|(at, call)| (at, course(call))).collect()
     }
 
-    /// What is asked after the draw, with these values.
+    /// The expressions that are evaluated after the draw, with these values.
     fn later(&self, locals: Vec<Value>) -> Later {
         let space = self.row.space;
         Later {
@@ -309,8 +309,8 @@ impl<'a> Judge<'a> {
         (effects, written)
     }
 
-    /// The distance from the ego vehicle of a place that is asked for beside another road user, m: NaN while that one is not
-    /// there, and below 0 on the other side of the ego vehicle.
+    /// The distance from the ego vehicle of a place beside another road user, m. It is NaN while that road user is
+    /// absent, and below 0 on the other side of the ego vehicle.
     fn beside_m(
         &self,
         of: Who,
@@ -328,7 +328,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Where a way beside the ego vehicle's route begins: at NaN m beside somebody who is not there.
+    /// Where a way beside the ego vehicle's route begins: at NaN m beside a road user that is absent.
     fn begins(&self, spawn: &SpawnDef, distance_m: f64, locals: &[Value]) -> Begins {
         let Some(of) = spawn.of else {
             return match spawn.behind {
@@ -339,7 +339,8 @@ impl<'a> Judge<'a> {
         Begins::BeforeFront(self.near_m(of, spawn.behind, distance_m, locals) - self.moment.ego_front_m)
     }
 
-    /// The station of the ego vehicle's route so far ahead of somebody's front, or behind its rear, m; NaN while nobody is there.
+    /// The station on the ego vehicle's route this far ahead of a road user's front, or behind its rear, m; NaN while
+    /// it is absent.
     fn near_m(&self, of: Who, behind: bool, distance_m: f64, locals: &[Value]) -> f64 {
         let who = of.bearer(locals);
         let Some((_, npc)) = self.bearers.iter().find(|(known, _)| *known == who) else { return f64::NAN };
@@ -410,7 +411,8 @@ impl<'a> Judge<'a> {
         LightRequest { colour: light.colour.word(functions, &facts), at_m: light.at.as_ref().map(at_m) }
     }
 
-    /// Why an order cannot be given after the effects before it. Somebody whom one of them spawns under that name is there.
+    /// Why an order cannot be given after the effects before it. A road user that one of them spawns under that name
+    /// counts as present.
     fn order_refusal(&self, order: &OrderRequest, before: &[Effect]) -> Option<Refusal> {
         let spawned = |who: usize| {
             before.iter().rev().find_map(|effect| match effect {
@@ -423,7 +425,7 @@ impl<'a> Judge<'a> {
             })
         };
         let is_there = |who: usize| self.bearers.iter().any(|(known, _)| *known == who);
-        // Of the gap to somebody who appears with the order the world knows nothing yet.
+        // The world does not yet know the gap to a road user that appears with the order.
         let to = order.command.to().filter(|to| *to == order.bearer || spawned(*to).is_none());
         let impossible = || match (spawned(order.bearer), to) {
             (None, _) => {
@@ -450,7 +452,7 @@ impl<'a> Judge<'a> {
         space.memory_after(row.action, values, self.situation.memory, road, Some(&self.world()))
     }
 
-    /// What the world says before it is asked about spawns.
+    /// The world's facts before it is asked about spawns.
     fn world(&self) -> WorldFacts {
         let (bearers, happened_s) = (self.bearers.clone(), self.situation.happened_s.to_vec());
         let step = self.situation.step;

@@ -1,4 +1,4 @@
-//! What a row does to the world once its parameters are drawn.
+//! The effects of a row on the world once its parameters are drawn.
 
 use avastra_lang::model::body::OwnBody;
 use avastra_lang::model::command::{Command, Told};
@@ -25,7 +25,7 @@ pub enum Effect {
     Light(LightRequest),
 }
 
-/// What the ego vehicle's next traffic light is to show.
+/// The colour that the ego vehicle's next traffic light is to show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LightRequest {
     pub colour: LightColour,
@@ -33,25 +33,25 @@ pub struct LightRequest {
     pub at_m: Option<f64>,
 }
 
-/// What the latest bearer of a name is told to do.
+/// An order to the latest bearer of a name.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrderRequest {
     /// The name, by its index in the space.
     pub bearer: usize,
     /// Empty for an order of a manoeuvre alone.
     pub command: Command,
-    /// What the phases of its manoeuvre tell.
+    /// The commands of its manoeuvre's phases.
     pub phases: Told,
 }
 
 impl OrderRequest {
-    /// Why nobody of that kind can be told this, in words; `None` if they can.
+    /// Why no road user of that kind can get this order, in words; `None` if it can.
     pub fn impossible(&self, verb: Verb) -> Option<String> {
         self.command.impossible(verb).or_else(|| self.phases.lacked_by(verb))
     }
 }
 
-/// Why nobody keeps a gap to some, in words that complete "cannot order `NAME`: …".
+/// Why a gap to an absent road user cannot be kept, in words that complete "cannot order `NAME`: …".
 pub(crate) const GAP_TO_NOBODY: &str = "nobody is there to whom it is to keep a gap";
 pub(crate) const GAP_TO_ITSELF: &str = "it keeps no gap to itself";
 
@@ -76,7 +76,7 @@ pub struct SpawnRequest {
     pub cover_own: Option<OwnBody>,
     /// A vehicle that is parked with it, so that it steps out from behind; for `Walk` alone.
     pub cover: Option<Body>,
-    /// What else it is told.
+    /// The other fields of its command.
     pub told: Fields<Said>,
     /// The trajectory that it follows; `distance_m` is then its station there.
     pub trajectory: Option<OnTrajectory>,
@@ -88,7 +88,7 @@ pub struct SpawnRequest {
     pub bearer: Option<usize>,
 }
 
-/// A trajectory that somebody follows.
+/// A trajectory that a road user follows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OnTrajectory {
     /// In the space.
@@ -151,7 +151,7 @@ impl SpawnRequest {
 }
 
 impl Effect {
-    /// What the world sees of a cell of a state: nothing, if the state is the author's own record.
+    /// The effect of a state's cell on the world: none if the state is the author's own record.
     pub(super) fn of_cell(state: &StateDef, cell: usize, memory: &Memory) -> Option<Effect> {
         let value = memory.cells()[state.first_cell + cell].variant();
         match &state.meaning {
@@ -161,7 +161,7 @@ impl Effect {
         }
     }
 
-    /// What the world sees of a change of the memory.
+    /// The effects of a change of the memory on the world.
     pub(super) fn of_change(space: &Space, before: &Memory, after: &Memory) -> Vec<Effect> {
         let cells = space.states.iter().flat_map(|state| (0..state.cells).map(move |cell| (state, cell)));
         let changed = cells.filter(|(state, cell)| {
@@ -205,7 +205,7 @@ impl LaneChangeRules {
     }
 }
 
-/// What the action table may ask the world.
+/// The questions that the action table may ask the world.
 pub trait Surroundings {
     /// Where a spawn would put its road user, in numbers; or why it cannot, in words.
     ///
@@ -213,7 +213,7 @@ pub trait Surroundings {
     /// A reason that completes "cannot spawn: …", for example `no lane on the left`.
     fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String>;
 
-    /// What can be asked about the ego vehicle and its surroundings now.
+    /// Facts about the ego vehicle and its surroundings now.
     fn moment(&self) -> MomentFacts;
 
     /// Surroundings for many questions about this moment, which find once what the questions have in common; `None` if
@@ -222,7 +222,7 @@ pub trait Surroundings {
         None
     }
 
-    /// What can be asked about the latest bearer of a name, if one is there.
+    /// Facts about the latest bearer of a name, if there is one.
     fn bearer(&self, _who: usize) -> Option<NpcFacts> {
         None
     }

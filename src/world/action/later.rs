@@ -1,4 +1,4 @@
-//! What is asked after the draw: by a driver before it changes lanes, by a manoeuvre at every tick.
+//! Expressions evaluated after the draw: by a driver before it changes lanes, by a manoeuvre at every tick.
 
 use avastra_lang::model::command::{Command, CommandDef};
 use avastra_lang::model::expr::Expr;
@@ -6,7 +6,7 @@ use avastra_lang::model::{
     Facts, FnDef, Memory, MomentFacts, NpcFacts, RoadFacts, SpawnFacts, Value, WorldFacts, evaluate,
 };
 
-/// What an action hands on to what is asked after it.
+/// The values that an action hands on to later evaluations.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Later {
     pub functions: Vec<FnDef>,

@@ -30,8 +30,8 @@ pub struct Situation<'a> {
     pub happened_s: &'a [f64],
 }
 
-/// The part of the steps in which actions that only set states come, by the balanced odds. Half of the rows of `avastra45.ava` are such, and
-/// weather alone hits nobody. Ours.
+/// The part of the steps in which actions that only set states come, by the balanced odds. Half of the rows of
+/// `avastra45.ava` are such, and weather alone hits no road user. Ours.
 const SETTING_SHARE: f64 = 0.15;
 
 /// How often a row is drawn by chance.
@@ -43,7 +43,7 @@ pub enum RowOdds {
     Chance { action: usize, chance: f64 },
 }
 
-/// What choosing a legal row would do now, or why the row is refused.
+/// The result of choosing a legal row now, or why the row is refused.
 pub type Offer = Result<Draw, Refusal>;
 
 /// A row with its drawn values.
@@ -52,7 +52,7 @@ pub struct Draw {
     pub row: usize,
     /// Values of the `any` parameters, as declared; numbers in SI units.
     pub values: Vec<(Arc<str>, Value)>,
-    /// What it does to the world, in order.
+    /// Its effects on the world, in order.
     pub effects: Vec<Effect>,
     pub memory_after: Memory,
     /// Rules on the lane changes of what it makes appear or orders; `None` without any.
@@ -119,7 +119,7 @@ impl ActionTable {
         let odds = |(action, odds): (usize, &&Expr)| {
             let value = evaluate(odds, &space.functions, &facts).number();
             match odds.ty {
-                // What has no value (a division by 0) never comes.
+                // Odds without a value (a division by 0) never come.
                 Type::Quantity(_) => {
                     RowOdds::Chance { action, chance: (value * space.episode.step_s).max(0.0) }
                 }
@@ -156,8 +156,7 @@ impl ActionTable {
         self.rows().iter().map(share).collect()
     }
 
-    /// One offer for each row. Every row draws from a stream of its own, so that one row's draws do not
-    /// change another's.
+    /// One offer for each row. Every row draws from its own stream, so that one row's draws do not change another's.
     pub fn offers(&self, situation: &Situation<'_>) -> Vec<Offer> {
         self.offers_at(situation, &[])
     }
@@ -181,7 +180,7 @@ impl ActionTable {
         Judge::new(&self.space, situation, row).draw(shares)
     }
 
-    /// What a step without an action does: to the world, and the memory after it.
+    /// The result of a step without an action: the effects on the world, and the memory after it.
     pub fn wait(&self, situation: &Situation<'_>) -> (Vec<Effect>, Memory) {
         let Situation { memory, road, rules, step, .. } = *situation;
         let bearers = || self.space.bearers_of_each_step();
@@ -218,7 +217,7 @@ impl ActionTable {
     }
 }
 
-/// What can be asked about the moment at which a step begins, of named road users about these.
+/// Facts of the moment at which a step begins, with those of these named road users.
 fn world_facts(situation: &Situation<'_>, bearers: impl Iterator<Item = usize>) -> WorldFacts {
     let Situation { surroundings, step, .. } = *situation;
     let bearers = bearers.filter_map(|who| Some((who, surroundings.bearer(who)?))).collect();

@@ -1,8 +1,8 @@
 //! Road users that follow a trajectory exactly, whatever comes, as the targets of proving grounds do: robots on a planned way.
 //!
-//! They take on a speed as they are told, move to the side of their way, and arrive at a place of it when the ego vehicle arrives
-//! at one of its route, as OpenSCENARIO's `SynchronizeAction` has it. Nobody is given way to, and nothing stops them but a
-//! contact and the end of the way.
+//! They take on a speed as told, and move to the side of their way. They arrive at a place of their way when the ego
+//! vehicle arrives at a place of its route, as in OpenSCENARIO's `SynchronizeAction`. They give way to no other road
+//! user, and only a contact or the end of the way stops them.
 
 use avastra_base::geometry::{Pose, smooth_step, unit_vector, wrap_angle};
 use avastra_lang::model::command::{AsideBy, Command};
@@ -18,7 +18,7 @@ use avastra_lang::model::body::BodyParameters;
 /// How fast one moves to the side that is told no `aside`, m/s. Ours.
 pub const ASIDE_MPS: f64 = 1.0;
 
-/// An ego vehicle that is slower does not arrive: who is to meet it stands, too, m/s.
+/// An ego vehicle slower than this does not arrive, m/s: a road user that is to meet it stands, too.
 const STANDING_MPS: f64 = 0.01;
 
 /// A speed so near to that of a steady change leads to the place in time, m/s.
@@ -37,9 +37,9 @@ impl Meeting {
         })
     }
 
-    /// The least error of its arrival if the ego vehicle keeps its speed, s: above 0 if it is late even at full speed, below 0 if it
-    /// is early even if it brakes. `gains_mps2` and `loses_mps2` are the limits of its body. `None` once the ego vehicle has not
-    /// kept its speed.
+    /// The least error of its arrival if the ego vehicle keeps its speed, s. It is above 0 if the road user is late
+    /// even at full speed, and below 0 if it is early even if it brakes. `gains_mps2` and `loses_mps2` are the limits
+    /// of its body. `None` once the ego vehicle has not kept its speed.
     fn late_s(
         &mut self,
         station_m: f64,
@@ -119,8 +119,9 @@ impl Meeting {
     }
 }
 
-/// The acceleration now of one that goes over from `from_mps` to `to_mps` on so long a way in so long a time, m/s²: first this one,
-/// then as strong a one against it. If the way is too short for that, it brakes to a stop, from which it sets out again later.
+/// The acceleration now, m/s², of a body that goes over from `from_mps` to `to_mps` on this way in this time: first
+/// this one, then the opposite one. If the way is too short for that, it brakes to a stop, from which it sets out again
+/// later.
 fn adapting_mps2(from_mps: f64, to_mps: f64, way_m: f64, time_s: f64) -> f64 {
     let lacks_m = 2.0 * way_m - (from_mps + to_mps) * time_s;
     let more_m = (to_mps - from_mps) * time_s;
@@ -165,7 +166,7 @@ impl Guided {
         let before_mps = self.speed_mps;
         let mut is_at_once = false;
         if let Some(meeting) = &mut self.meeting {
-            // What brings it there in time may be more than its body can do.
+            // To arrive in time may take more than its body can do.
             let (gains_mps2, loses_mps2) =
                 (size.acceleration_mps2_max, around.braking_mps2(size, self.speed_mps));
             // In its last part it goes on whatever the ego vehicle does.

@@ -9,8 +9,8 @@ use crate::action::LaterMoment;
 use crate::state::manoeuvre::{Running, Stage, Tracked};
 use crate::state::time::{DT_S, ticks};
 
-/// A road user this near to the speed of a phase has it, m/s, or by this part of it: without a `rate`, the driver model only
-/// approaches it.
+/// A road user within this of a phase's speed has reached it, m/s, or within this part of it. Without a `rate`, the
+/// driver model only approaches the speed.
 const SPEED_REACHED_MPS: f64 = 0.1;
 const SPEED_REACHED_PART: f64 = 0.02;
 
@@ -34,7 +34,7 @@ impl Progress {
     /// Whether it has done what a command says.
     pub fn meets(&self, command: &Command) -> bool {
         let speed_mps = command.speed_mps().filter(|_| !command.pursues());
-        // Who stands as told moves no farther to the side.
+        // A road user that stands as told moves no farther to the side.
         let stands = self.moves != Moves::Walks && speed_mps == Some(0.0) && self.speed_mps == 0.0;
         !command.is_continuous()
             && speed_mps.is_none_or(|mps| self.is_over || self.has_speed(mps))
@@ -43,7 +43,8 @@ impl Progress {
             && (self.has_turned || command.turn().is_none())
     }
 
-    /// Whether it has the speed that a phase wants, m/s. A stop is exact, and who follows a trajectory comes to every speed exactly.
+    /// Whether it has the speed that a phase wants, m/s. A stop is exact, and a road user on a trajectory reaches every
+    /// speed exactly.
     fn has_speed(&self, wanted_mps: f64) -> bool {
         let is_exact = wanted_mps == 0.0 || self.moves == Moves::Follows;
         let near_mps = SPEED_REACHED_MPS.max(SPEED_REACHED_PART * wanted_mps.abs());
@@ -51,11 +52,11 @@ impl Progress {
     }
 }
 
-/// What a tick does to a manoeuvre.
+/// The result of a tick for a manoeuvre.
 pub struct Advance {
-    /// What is left of it.
+    /// The rest of the manoeuvre.
     pub rest: Option<Running>,
-    /// What a phase tells the driver that begins now.
+    /// The command of a phase that begins now, for the driver.
     pub command: Option<Command>,
     /// How many phases have begun, and ended. One that is left out has done both.
     pub begun: u32,
@@ -65,8 +66,8 @@ pub struct Advance {
 }
 
 impl Running {
-    /// What the continuous speed of a phase tells now, at the rate with which that began; `None` if there is none, or it has no value
-    /// now.
+    /// The value now of a phase's continuous speed, at the rate with which the phase began; `None` if there is none, or
+    /// it has no value now.
     pub fn tracked(&self, moment: &LaterMoment, moves: Moves) -> Option<Command> {
         let Tracked { course, phase, first } = self.tracked.as_ref()?;
         let mut now = Command::default().with(Field::Speed, course.speed_mps(*phase, moment)?);
@@ -147,7 +148,7 @@ impl Running {
         }
     }
 
-    /// What is left when no phase is: a speed that is tracked.
+    /// The rest once no phase is left: a speed that is tracked.
     fn over(self) -> Option<Running> {
         self.tracked.is_some().then_some(Running { stage: Stage::Over, ..self })
     }

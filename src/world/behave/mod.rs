@@ -1,4 +1,4 @@
-//! What road users do next: drivers, people, who follows a trajectory, manoeuvres, and who of two goes first.
+//! The next moves of road users: drivers, pedestrians, followers of a trajectory, manoeuvres, and the right of way.
 
 pub mod guided;
 pub mod manoeuvre;

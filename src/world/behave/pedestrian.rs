@@ -1,11 +1,11 @@
 //! Pedestrians who cross the road: they wait at the kerb, walk straight over to the other, and go out of sight.
 //!
-//! A pedestrian sets out when it would meet the ego vehicle in the middle of that vehicle's way, but waits at
-//! least 1 s (published package) and at most 10 s. One that is to be met at a point of the ego vehicle's front waits until then,
-//! at most 60 s, goes by the ego vehicle's speed of each moment until it sets out, and then walks steadily, as the targets of
-//! Euro NCAP's tests do. Behind the other kerb it walks on as far as there is room, and
-//! leaves the world when the ego vehicle cannot see it. One that is told its speed, by an order or by a phase of its
-//! manoeuvre, sets out or turns round at once and walks steadily from then on.
+//! A pedestrian sets out when it would meet the ego vehicle in the middle of that vehicle's way. It waits at least 1 s
+//! (published package) and at most 10 s. A pedestrian that is to be met at a point of the ego vehicle's front waits
+//! until then, at most 60 s. Until it sets out it goes by the ego vehicle's speed of each moment. Then it walks
+//! steadily, as the targets of Euro NCAP's tests do. Behind the other kerb it walks on as far as there is room, and
+//! leaves the world when the ego vehicle cannot see it. A pedestrian with an ordered speed, by an order or by a phase
+//! of its manoeuvre, sets out or turns round at once. From then on it walks steadily.
 //!
 //! The published package's pedestrian walks on, whatever comes. Here that is the most frequent of four manners,
 //! drawn once from the pedestrian's own stream:
@@ -17,8 +17,8 @@
 //! | 15 % | startled | stops once, for 1 to 2 s, when a vehicle would reach it within 1.5 s |
 //! | 15 % | hurried | runs, at most 8 km/h (Euro NCAP's running adult), while a vehicle would be there within 3 s |
 //!
-//! The shares and times are ours; no source counts them. No pedestrian walks into the side of a vehicle: they wait
-//! before it, pass each other on the right, and turn round after 10 s without a way on. A pedestrian who is hit
+//! The shares and times are ours; no source counts them. No pedestrian walks into the side of a vehicle. Pedestrians
+//! wait before it, pass each other on the right, and turn round after 10 s without a way on. A pedestrian who is hit
 //! stops (see `road_user`).
 
 use avastra_base::geometry::{OrientedBox, Pose, Vec2, distance_m, wrap_angle};
@@ -74,8 +74,8 @@ impl Manner {
 }
 
 impl Meeting {
-    /// How long the pedestrian can still wait, if the ego vehicle keeps its speed and its place beside the route, s; negative
-    /// if it is too late, and without end before a vehicle that stands.
+    /// How long the pedestrian can still wait, s, if the ego vehicle keeps its speed and its place beside the route. It
+    /// is negative if it is too late, and infinite before a vehicle that stands.
     pub fn left_s(self, speed_mps: f64, around: &Around) -> f64 {
         let aside_m = if self.comes_from_left { -around.ego_offset_m } else { around.ego_offset_m };
         let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
@@ -88,7 +88,7 @@ impl Meeting {
 }
 
 impl Walker {
-    /// A pedestrian who is to walk; the manner is drawn.
+    /// A pedestrian that will walk; the manner is drawn.
     pub fn new(walk: Walk, spawn_tick: u64, rng: &mut Rng) -> Walker {
         let Walk { meeting, waits_s, from, way_m, beyond_m, speed_mps, meets_s } = walk;
         let is_told = meeting.is_some() || waits_s.is_some();
@@ -118,7 +118,7 @@ impl Walker {
         }
     }
 
-    /// The strip of ground that it still has to walk over, of its own width.
+    /// The strip of ground that it still has to walk over, as wide as the pedestrian.
     pub fn strip(&self, this: &OrientedBox) -> OrientedBox {
         let (from_m, to_m) = if self.returns { (0.0, self.walked_m) } else { (self.walked_m, self.end_m) };
         let middle = self.from.offset((from_m + to_m) / 2.0, 0.0);
@@ -154,7 +154,7 @@ impl Walker {
         if around.tick < self.begins_tick {
             return Some(Moved::at_rest(this));
         }
-        // Who was told to go waits for what is in the way, and does not turn round by itself.
+        // A pedestrian ordered to go waits for obstacles in the way, and does not turn round by itself.
         if self.is_told && self.pace_mps == 0.0 {
             return Some(Moved::at_rest(this));
         }
@@ -213,7 +213,7 @@ impl Walker {
             }
             return;
         }
-        // On the right of its own direction.
+        // On the right, seen in its walking direction.
         let right_m = if self.returns { ASIDE_M } else { -ASIDE_M };
         self.wants_aside_m = if self.meets_pedestrian(around) { right_m } else { 0.0 };
         let startled = self.manner == Manner::Startled && self.startle_ticks > 0;
@@ -244,7 +244,7 @@ impl Walker {
     }
 }
 
-/// Whether something stands or passes right before the feet of somebody at a pose.
+/// Whether an obstacle stands or passes right before the feet of a pedestrian at a pose.
 pub fn is_blocked(pose: Pose, this: &Obstacle, around: &Around) -> bool {
     let next = OrientedBox { pose: pose.offset(STEP_M, 0.0), ..this.outline };
     around.others().any(|Other { outline, elevation_m, .. }| {

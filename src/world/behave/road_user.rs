@@ -1,4 +1,4 @@
-//! What a tick and an order do with a road user, whatever moves it: a driver, two legs, a trajectory or nothing.
+//! Ticks and orders for a road user, whatever moves it: a driver, two legs, a trajectory or nothing.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::view::around::{Around, View};
 const WRECK_S: f64 = 2.0;
 
 impl Motion {
-    /// How far it is with what it was told; `None` for who only stands.
+    /// The progress with its order; `None` for a road user that only stands.
     pub fn progress(&self, around: &Around) -> Option<Progress> {
         let on_foot = |speed_mps, is_aside, is_over| Progress {
             speed_mps,
@@ -103,7 +103,7 @@ impl Mover {
                 moved
             }
             Motion::Walk(_) | Motion::Stroll(_) if self.touched => Some(rest),
-            // Who has still something to do does not leave.
+            // A road user with an order still to carry out does not leave.
             Motion::Walk(walker) => walker.step(this, in_sight || self.course.is_some(), around),
             Motion::Stroll(stroller) => stroller.step(this, in_sight || self.course.is_some(), around),
             Motion::Guide(guided) => {
@@ -130,8 +130,8 @@ fn slide(this: &Obstacle, around: &Around) -> Moved {
 }
 
 impl World {
-    /// Whether the road user with an id has done what a command says: it has the speed, is in the lane and at the place
-    /// beside its middle, and the junction of its turn is behind it.
+    /// Whether the road user with an id has carried out a command. It has the speed, is in the lane and at the offset,
+    /// and is past the junction of its turn.
     pub fn has_done(&self, id: u32, command: &Command) -> bool {
         let user = self.user(id);
         let progress = user.and_then(|user| user.mover.motion.progress(&self.alone()));

@@ -1,13 +1,12 @@
 //! Ambient traffic: vehicles that no action commanded and that only drive on.
 //!
-//! An episode that asks for it keeps a number of them around the ego vehicle. At the start
-//! they are there already. Later ones appear on streets beyond the range of the ego vehicle's sensors.
-//! They leave when they are [`BEHIND_M`] beyond that range behind it, or [`AROUND_M`] anywhere. Place,
-//! body, colour and speed are drawn from a stream of their own, with one index for each attempt, so that
-//! commanded traffic draws the same with and without them. They drive at 80 to 100 % of each lane's limit,
-//! change lanes where they gain by it (`npc::mobil`), turn as drawn, and yield (`npc::manners`) to the ego vehicle, too. They count
-//! neither towards the ten obstacles of the published package nor among `npc#1`, `npc#2`, …: their
-//! ids begin above `state::ambient::COMMANDED_MAX`.
+//! An episode that asks for it keeps a number of them around the ego vehicle. At the start they are there already.
+//! Later ones appear on streets beyond the range of the ego vehicle's sensors. They leave when they are [`BEHIND_M`]
+//! beyond that range behind it, or [`AROUND_M`] anywhere. Place, body, colour and speed are drawn from a separate
+//! stream, with one index for each attempt. So commanded traffic draws the same with and without them. They drive at 80
+//! to 100 % of each lane's limit, change lanes where they gain by it (`npc::mobil`), and turn as drawn. They yield
+//! (`npc::manners`), to the ego vehicle, too. They count neither towards the ten obstacles of the published package nor
+//! among `npc#1`, `npc#2`, …: their ids begin above `state::ambient::COMMANDED_MAX`.
 
 use avastra_base::geometry::OrientedBox;
 use avastra_base::rng;
@@ -31,14 +30,14 @@ pub const RENEWAL_TICKS: u64 = 25;
 /// Ambient vehicles leave when they are so far beyond the range of the ego vehicle's sensors, m; behind it sooner.
 const AROUND_M: f64 = 80.0;
 const BEHIND_M: f64 = 20.0;
-/// Least distance to the ego vehicle at the start of an episode, m: two seconds at 50 km/h and the way
-/// to brake; for a faster ego vehicle the way of two seconds.
+/// Least distance to the ego vehicle at the start of an episode, m: two seconds at 50 km/h and the way to brake. For a
+/// faster ego vehicle it is the way of two seconds.
 const START_ROOM_M: f64 = 45.0;
 const START_ROOM_S: f64 = 2.0;
 /// Least gap between a newcomer and any other road user, m.
 const ROOM_M: f64 = 20.0;
-/// Least distance of a newcomer to the end of a street, where a signal may be red, m: the way to brake
-/// from 50 km/h at 3 m/s², rounded down.
+/// Least distance of a newcomer to the end of a street, where a signal may be red, m. It is the way to brake from 50
+/// km/h at 3 m/s², rounded down.
 const STREET_END_M: f64 = 30.0;
 /// Draws before an attempt is given up: at the start, when all are to find a place, and later.
 const START_DRAWS_MAX: usize = 256;

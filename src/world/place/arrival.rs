@@ -13,8 +13,8 @@ const EGO_GAINS_MPS2: f64 = 1.5;
 /// Lateral acceleration with which it is expected to take bends, m/s²: ours, as above.
 const EGO_LATERAL_MPS2: f64 = 2.0;
 
-/// The drive that is expected from one moment on, kept step by step as far as it was asked for: drawing asks for dozens
-/// of arrivals of a moment, which all begin alike. Valid for one moment only.
+/// The drive that is expected from one moment on, kept step by step as far as it was needed. Drawing needs dozens of
+/// arrivals of a moment, and all begin with the same drive. Valid for one moment only.
 #[derive(Debug, Default)]
 pub struct Arrivals(RefCell<Vec<Expected>>);
 

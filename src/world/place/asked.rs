@@ -1,4 +1,4 @@
-//! What is asked of a moment, and what the verbs share to make it appear.
+//! The request of a moment, and the steps that the verbs share to make its road user appear.
 
 use std::sync::Arc;
 
@@ -19,10 +19,10 @@ use avastra_lang::model::body::BodyParameters;
 /// Least gap between a newcomer and any other road user, m.
 pub const ROOM_M: f64 = 0.5;
 
-/// Who follows a trajectory stands exactly where it was put: Euro NCAP parks cars 0.2 m apart.
+/// A road user on a trajectory stands exactly where it was put: Euro NCAP parks cars 0.2 m apart.
 pub const GUIDED_ROOM_M: f64 = 0.05;
 
-/// What is asked of a moment: which road user shall appear, of which size, and with which id.
+/// The request of a moment: which road user shall appear, of which size, and with which id.
 pub struct Asked<'a> {
     pub around: &'a Around<'a>,
     pub arrivals: &'a Arrivals,
@@ -31,7 +31,7 @@ pub struct Asked<'a> {
     pub id: u32,
 }
 
-/// What a request makes appear.
+/// The road users that a request makes appear.
 pub struct Newcomers {
     pub asked: RoadUser,
     /// The vehicle that is parked with it; its id follows.

@@ -1,5 +1,5 @@
-//! Crossing traffic: a rendezvous with the ego vehicle at a conflict of its route, on a leg whose signal will
-//! be green; or somebody who stands at the line of such a leg.
+//! Crossing traffic: a rendezvous with the ego vehicle at a conflict of its route, on a leg whose signal will be green.
+//! Or a vehicle that stands at the line of such a leg.
 
 use avastra_lang::model::vocabulary::{Side, Then, TrafficRule};
 use avastra_road::{Conflict, LaneIndex, StopLine};
@@ -19,9 +19,9 @@ use crate::view::around::Around;
 
 /// How far beyond the asked distance a crossing may lie, m.
 const CROSSING_M: f64 = 60.0;
-/// Nobody who is to be somewhere before the ego vehicle comes from farther away than this time, s.
+/// A vehicle with an arrival before the ego vehicle comes from no farther away than this time, s.
 const ARRIVAL_S_MAX: f64 = 120.0;
-/// Who stands at a line stands this far before it, m.
+/// A vehicle that stands at a line stands this far before it, m.
 const BEFORE_LINE_M: f64 = 1.0;
 /// A stop line within this distance behind a newcomer counts as passed when it appears, m.
 const BEYOND_LINE_M: f64 = 30.0;
@@ -173,7 +173,8 @@ fn approach_m(asked: &Asked, way: &Way, meeting_m: f64, arrival_s: f64) -> Resul
     let signs_m: &[f64] = if minds_signals { &way.stop_signs_m } else { &[] };
     let lines: &[StopLine] = if minds_signals { &way.stop_lines } else { &[] };
     while left_s > 1e-9 {
-        // A driver looks from the middle of its vehicle. Who is to be there at no certain time was placed by its front before.
+        // A driver looks from the middle of its vehicle. A vehicle without a set arrival was placed by its front
+        // before.
         let from_m = if request.told.early_s().is_some() { front_m - size.length_m / 2.0 } else { front_m };
         let speed_mps = request.speed_mps.min(way.speed_mps_max(from_m)).max(0.1);
         let step_m = TIMING_M.min(speed_mps * left_s);

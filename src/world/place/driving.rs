@@ -25,8 +25,8 @@ const CUT_IN_M: f64 = 5.0;
 /// How far in front of the ego vehicle an overtaker that only wants to pass comes back to its lane, m: two seconds in town.
 /// Ours.
 const RETURN_M: f64 = 20.0;
-/// The lane of a row is followed for this part of the row's length, and so much more, m: a lane outside a bend is longer than the
-/// route. Ours.
+/// The lane of a row is followed for this part of the row's length, and so much more, m. A lane outside a bend is
+/// longer than the route. Ours.
 const ROW_PART: f64 = 1.2;
 const ROW_M: f64 = 30.0;
 
@@ -46,9 +46,9 @@ pub fn drive_ahead(asked: &Asked) -> Result<Driver, String> {
     Ok(commanded(asked, way, turns_in, station_m, plan))
 }
 
-/// The lane of one that is at this station of the route: `choose` finds it for one alone. Others of a row are in the lane of the
-/// first one, or in one that this leads to (against the direction of the route: that leads to this): where the route changes its
-/// lane or the road gains one, `choose` alone would put a row into two.
+/// The lane of one that is at this station of the route: `choose` finds it for one alone. Others of a row are in the
+/// lane of the first one, or in a lane that this leads to. Against the direction of the route, they are in a lane that
+/// leads to this. Where the route changes its lane or the road gains one, `choose` alone would put a row into two.
 ///
 /// # Errors
 /// That there is no such lane, in words.
@@ -134,8 +134,8 @@ pub fn drive_behind(asked: &Asked) -> Result<Driver, String> {
     Ok(commanded(asked, way, turns_in, station_m, plan))
 }
 
-/// The lanes that lead to this one beside the ego vehicle, itself the last, and the station on them at which a vehicle's front
-/// bumper is `distance_m` behind the ego vehicle's rear bumper, measured in its own lane.
+/// The lanes that lead to this one beside the ego vehicle, itself the last. Also the station on them at which a
+/// vehicle's front bumper is `distance_m` behind the ego vehicle's rear bumper, measured in its own lane.
 fn from_behind(asked: &Asked, lane: LaneIndex) -> Result<(Vec<LaneIndex>, f64), String> {
     let Asked { around, request, size, .. } = *asked;
     let rear = around.ego.rear_axle.offset(-VehicleParameters::MKZ.rear_axle_to_back_m, 0.0);
@@ -154,8 +154,8 @@ fn from_behind(asked: &Asked, lane: LaneIndex) -> Result<(Vec<LaneIndex>, f64), 
     Ok((lanes, station_m))
 }
 
-/// The way along these lanes, to where the request asks to go at the first junction after them, and the lane in which it goes
-/// there. One that changes its lane will turn from another one.
+/// The way along these lanes, to where the request asks to go at the first junction after them. Also the lane in which
+/// it goes there. One that changes its lane will turn from another one.
 ///
 /// # Errors
 /// That the last of the lanes does not lead there, in words.

@@ -1,9 +1,9 @@
 //! Where a spawn puts its road user, and whether there is room.
 //!
-//! `distance_m` is the gap between the outlines along the ego vehicle's route, but for `Follow`, for which it is a station of
-//! the trajectory. What lies at that distance is each verb's business; the waiting times are those of the published package (its
-//! offsets are not: they ignore the lanes). A pedestrian who walks begins at a kerb, at most 10 m from the asked
-//! place (`on_foot`). Traffic drives on the right.
+//! `distance_m` is the gap between the outlines along the ego vehicle's route, but for `Follow`, for which it is a
+//! station of the trajectory. Each verb decides what lies at that distance. The waiting times are those of the
+//! published package; its offsets are not, because they ignore the lanes. A pedestrian who walks begins at a kerb, at
+//! most 10 m from the asked place (`on_foot`). Traffic drives on the right.
 
 pub mod ambient;
 pub mod arrival;
@@ -73,7 +73,7 @@ pub fn place(
     Ok(Newcomers { asked: finish(&asked, Motion::Drive(driver), moved)?, cover: None })
 }
 
-/// Who follows a trajectory, at its station, or where that begins beside the route.
+/// A road user on a trajectory, at its station, or where the trajectory begins beside the route.
 fn on_trajectory(asked: &Asked) -> Result<Newcomers, String> {
     let Asked { around, request, size, .. } = asked;
     let scene = around.scene;
@@ -124,18 +124,18 @@ fn check(request: &SpawnRequest) -> Result<(), String> {
 
 /// The distances that rules ask for.
 ///
-/// The gap at the spawn is between the outlines. The safety gap is what a careful driver needs (see
-/// `view::safety`): to slow down to a vehicle ahead, or to stop for a newcomer that crosses, walks or stands.
-/// For a newcomer from behind it is what the newcomer needs to slow down to the ego vehicle. An oncoming
-/// vehicle stays in its own lanes and needs none, unless its way crosses the route at a junction or it appears beside the
-/// middle of its lane, towards the ego vehicle.
+/// The gap at the spawn is between the outlines. The safety gap is what a careful driver needs (see `view::safety`).
+/// The driver slows down to a vehicle ahead, or stops for a newcomer that crosses, walks or stands. For a newcomer from
+/// behind it is what the newcomer needs to slow down to the ego vehicle. An oncoming vehicle stays in its own lanes and
+/// needs none. It needs one if its way crosses the route at a junction, or if it appears at an offset from the middle
+/// of its lane, towards the ego vehicle.
 ///
-/// A newcomer in plain view (not from behind, and not hidden by others, fog or distance) needs at least
-/// the way that the ego vehicle drives while a careful driver perceives and reacts, even if it would be
-/// no danger: it must not seem to come from nowhere.
+/// A newcomer is in plain view if it is not behind, and not hidden by others, fog or distance. It then needs at least
+/// the way that the ego vehicle drives while a careful driver perceives and reacts, even if it would be no danger: it
+/// must not seem to come from nowhere.
 ///
-/// A parked vehicle that appears with a pedestrian is nearer than the pedestrian, and the gap is that to the
-/// vehicle: both appear where a careful driver could still stop.
+/// A parked vehicle that appears with a pedestrian is nearer than the pedestrian, and the gap is measured to the
+/// vehicle. So both appear where a careful driver could still stop.
 pub fn facts(around: &Around, request: &SpawnRequest, newcomers: &Newcomers) -> SpawnFacts {
     let newcomer = &newcomers.asked;
     let along_mps = around.ego_outline.pose.forward().dot(&newcomer.obstacle.velocity_mps);

@@ -7,7 +7,8 @@ use avastra_base::geometry::{OrientedBox, distance_m};
 use avastra_lang::model::vocabulary::{Body, Colour, ShownLights, Verb};
 use avastra_road::is_apart;
 
-/// What walks or stands does so beside this stretch of the ego vehicle's route, before and behind it, m.
+/// Pedestrians, animals and things walk or stand beside this stretch of the ego vehicle's route, before and behind it,
+/// m.
 const ON_FOOT_M: f64 = 200.0;
 
 impl RoadUser {

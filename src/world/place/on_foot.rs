@@ -1,5 +1,5 @@
-//! People on foot. A pedestrian who crosses the road goes from kerb to kerb, timed to meet the ego vehicle, and may
-//! step out from behind a parked vehicle that appears at the same time.
+//! People on foot. A pedestrian who crosses the road goes from kerb to kerb, timed to meet the ego vehicle. It may step
+//! out from behind a parked vehicle that appears at the same time.
 
 use core::f64::consts::FRAC_PI_2;
 
@@ -48,7 +48,7 @@ pub fn on_foot(asked: &Asked) -> Result<Newcomers, String> {
     let asked_m = ahead_m(asked)?;
     if request.verb == Verb::Stand {
         let lane = around.scene.route.path.pose_at(asked_m).offset(0.0, request.offset_m());
-        // Who is on foot looks across the road; a thing lies along it.
+        // A pedestrian or an animal looks across the road; a thing lies along it.
         let turn_rad = match request.side {
             _ if request.body == Body::Object => 0.0,
             Side::Left => -FRAC_PI_2,
@@ -82,8 +82,8 @@ pub fn on_foot(asked: &Asked) -> Result<Newcomers, String> {
     Err(refusal.unwrap_or_else(|| "the route ends before that distance".into()))
 }
 
-/// Stations of the route at which to try, the best first: the middle of a crosswalk at the asked place, the asked
-/// place, then those farther on, because a rule may ask for a gap, and those nearer.
+/// Stations of the route at which to try, the best first. First comes the middle of a crosswalk at the asked place,
+/// then the asked place. Then come those farther on, because a rule may ask for a gap, and those nearer.
 fn stations(around: &Around, asked_m: f64) -> impl Iterator<Item = f64> {
     let route = &around.scene.route;
     let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
@@ -136,8 +136,8 @@ fn walk(asked: &Asked, way: &Crossing) -> Result<RoadUser, String> {
         way_m,
         beyond_m: way.to.beyond_m,
         speed_mps: request.speed_mps,
-        // As in Euro NCAP's tests with an impact at half the width: it is in the middle of the ego vehicle's way when
-        // that vehicle's front arrives.
+        // The impact is at half the width, as in Euro NCAP's tests: the pedestrian is in the middle of the ego
+        // vehicle's way when that vehicle's front arrives.
         meets_s: arrivals.after_s(around, way.station_m - front_m) - way.from.way_m / request.speed_mps,
     };
     let walker = Walker::new(walk, around.tick, &mut choices(around.seed, id, 0));
@@ -185,8 +185,8 @@ fn park(asked: &Asked, body: Body, way: &mut Crossing) -> Result<RoadUser, Strin
     if parked.has_room(around, ROOM_M) { Ok(parked) } else { Err("another road user is there".into()) }
 }
 
-/// Refuses a place at which a cover stands in the pedestrian's way, as it may in a bend, or does not hide the
-/// pedestrian but for what stands out above its roof.
+/// Refuses a place at which a cover stands in the pedestrian's way, as it may in a bend. Also refuses a cover that does
+/// not hide the pedestrian; the part above its roof does not count.
 fn check_cover(around: &Around, pedestrian: &RoadUser, cover: &RoadUser) -> Result<(), String> {
     if let Motion::Walk(walker) = &pedestrian.mover.motion
         && distance_m(&walker.strip(&pedestrian.obstacle.outline), &cover.obstacle.outline) < HALF_STRIP_M

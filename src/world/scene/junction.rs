@@ -1,5 +1,5 @@
-//! Conflict areas: the parts of a junction's lanes on which two vehicles would be in each other's way,
-//! and which of the two lanes goes first.
+//! Conflict areas: the parts of a junction's lanes on which two vehicles would be in each other's way. For each, the
+//! lane that goes first.
 //!
 //! Made once for a map from its lanes alone. Where the way of another vehicle passes through the area,
 //! and when, is for the drivers to judge (see `manners`). Lanes that leave the same lane are no
@@ -25,7 +25,7 @@ const OPPOSING_RAD_MIN: f64 = 135.0 * core::f64::consts::PI / 180.0;
 /// Up to this angle they come from the same side, rad.
 const ALONGSIDE_RAD_MAX: f64 = 30.0 * core::f64::consts::PI / 180.0;
 
-/// Two lanes from the same side that turn alike but for this, rad (15°), are told apart by their names. Ours.
+/// Two lanes from the same side whose turns differ by less than this, rad (15°), are told apart by their names. Ours.
 const ALIKE_RAD: f64 = core::f64::consts::PI / 12.0;
 
 /// One lane's part of a conflict.
@@ -122,7 +122,7 @@ pub(crate) fn goes_first(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> bool {
     order(map, a, b).0
 }
 
-/// What decides which of two lanes goes first.
+/// The criterion that decides which of two lanes goes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Order {
     Signs,
@@ -133,14 +133,13 @@ pub(crate) enum Order {
 
 /// Whether `a` goes before `b`, and what decides it.
 ///
-/// Signs decide first: a priority road before a lane without signs, and that before a stop or yield sign.
-/// Where they say the same, a vehicle that turns left (right, where traffic keeps left) or round yields to oncoming
-/// traffic; otherwise the vehicle from the right
-/// goes first (Vienna Convention, article 18; so in Estonia and California).
+/// Signs decide first: a priority road before a lane without signs, and that before a stop or yield sign. Where they
+/// say the same, a vehicle that turns left (right, where traffic keeps left) or round yields to oncoming traffic.
+/// Otherwise the vehicle from the right goes first (Vienna Convention, article 18; so in Estonia and California).
 ///
-/// If both come from the same side, the one that turns less goes first. A circle or a bend that both come round is no turn
-/// ([`turns_rad`]). If they turn alike, a vehicle that turns across the road yields; otherwise the lane that the file names first
-/// goes first.
+/// If both come from the same side, the one that turns less goes first. A circle or a bend that both come round is no
+/// turn ([`turns_rad`]). If they turn equally, a vehicle that turns across the road yields; otherwise the lane that the
+/// file names first goes first.
 pub(crate) fn order(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> (bool, Order) {
     let (signs_a, signs_b) = (map.lane(a).precedence, map.lane(b).precedence);
     if signs_a != signs_b {
@@ -225,7 +224,7 @@ mod tests {
         assert!(of_north.goes_first && !of_east.goes_first, "the one going north comes from the right");
     }
 
-    /// What is skipped because it is far away makes no difference.
+    /// Stretches skipped as too far away make no difference.
     #[test]
     fn stretches_are_those_of_a_comparison_at_every_step() {
         let naive = |lane: &Lane, other: &Lane| {

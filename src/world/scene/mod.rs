@@ -24,8 +24,8 @@ use way::Roads;
 /// 408-21).
 const MOTORWAY_RANGE_M: f64 = 250.0;
 
-/// The route is looked at in points this far from each other, m, and in so many of them: as far as vehicles are sensed on
-/// motorways.
+/// The route is looked at in points this far from each other, m, and in so many of them. They reach as far as vehicles
+/// are sensed on motorways.
 pub(crate) const WAY_STEP_M: f64 = 10.0;
 const WAY_POINTS: usize = (MOTORWAY_RANGE_M / WAY_STEP_M) as usize;
 
@@ -68,7 +68,7 @@ impl RoutePoints {
     }
 }
 
-/// What stays the same during all episodes of one road. Shared, never copied.
+/// The parts that stay the same during all episodes of one road. Shared, never copied.
 #[derive(Debug)]
 pub struct Scene {
     pub map: Arc<RoadMap>,
@@ -167,8 +167,8 @@ impl Scene {
         self.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0
     }
 
-    /// The number of the lane in which somebody at a station and an offset of the route is. The lane in which the route begins has
-    /// 0, those to its left 1, 2 and so on; where the route changes lanes, its lane has another number from there on.
+    /// The number of the lane at a station and an offset of the route. The lane in which the route begins has 0, those
+    /// to its left 1, 2 and so on. Where the route changes lanes, its lane has another number from there on.
     pub(crate) fn lane_number(&self, station_m: f64, offset_m: f64) -> i32 {
         let mut number = self.route_lane_number(station_m);
         let Some((right_m, left_m)) = self.strip(station_m, number) else { return number };
@@ -204,7 +204,7 @@ impl Scene {
         let (nth, mut is_ours) = (number - self.route_lane_number(station_m), true);
         for _ in 0..nth.abs() {
             let of = self.map.lane(lane);
-            // What lies to our left is to the right of who comes towards us.
+            // Our left is the right of oncoming traffic.
             let next = if (nth > 0) == is_ours { of.left } else { of.right }?;
             let beside = self.map.lane(next.lane);
             let width_m = beside.width_at(beside.centre.project(here).station_m);

@@ -1,9 +1,9 @@
 //! Traffic profiles: how other vehicles drive, as settings that a run can change.
 //!
 //! The default, `scenarios/traffic/careful.yaml`, is how they drive unless a run says otherwise.
-//! `scenarios/traffic/rightful.yaml` does not save an ego vehicle that breaks the rules,
-//! `scenarios/traffic/released.yaml` is what the vehicles of LGSVL did, as far as its published constants tell.
-//! What no profile changes: signals, conflict areas among other vehicles, bodies and friction.
+//! `scenarios/traffic/rightful.yaml` does not save an ego vehicle that breaks the rules.
+//! `scenarios/traffic/released.yaml` has the behaviour of LGSVL's vehicles, as far as its published constants tell. No
+//! profile changes signals, conflict areas among other vehicles, bodies or friction.
 
 use avastra_lang::model::{LIMIT_PART_MAX, digest};
 use avastra_lang::syntax::{listed, yaml_mistake};
@@ -13,7 +13,8 @@ section! {
     pub struct TrafficProfile {
         /// Whether ambient vehicles yield to the ego vehicle at junctions. Commanded ones never do: see `behave::npc::manners`.
         yields_to_ego: bool = true;
-        /// Whether ambient vehicles take their right of way before the ego vehicle: they expect that it keeps the rules, and brake for one that does not only once it is where their ways cross. Ours.
+        /// Whether ambient vehicles take their right of way before the ego vehicle. They then expect that it keeps the
+        /// rules. For an ego vehicle that breaks them they brake only once it is where their ways cross. Ours.
         takes_right: bool = false;
         /// Ambient vehicles drive at least at this part of each lane's limit, in `[0.1, 1.5]`. Ours.
         limit_part_min: f64 = 0.8, 0.1..=LIMIT_PART_MAX;
@@ -29,7 +30,8 @@ section! {
         stop_m: f64 = 12.0, 0.0..=50.0;
         /// The same on straight lanes through junctions and within 10 m before them, m, in `[0, 50]`. LGSVL: 20.
         stop_junction_m: f64 = 20.0, 0.0..=50.0;
-        /// Part of a speed that is lost in a second, 1/s, in `[0.1, 20]`: this, and as much again for each step of aggression from 1 to 3. LGSVL: 2.
+        /// Part of a speed that is lost in a second, 1/s, in `[0.1, 20]`. Each step of aggression from 1 to 3 adds as
+        /// much again. LGSVL: 2.
         stop_rate_ps: f64 = 2.0, 0.1..=20.0;
         /// Room in front and behind that drivers want before changing lanes, m, in `[0, 50]`. Ours.
         change_room_m: f64 = 2.0, 0.0..=50.0;
@@ -138,7 +140,7 @@ impl TrafficProfile {
         Ok(())
     }
 
-    /// What differs from the default, in one line of YAML for [`TrafficProfile::from_yaml`].
+    /// The differences from the default, in one line of YAML for [`TrafficProfile::from_yaml`].
     pub fn to_line(&self) -> String {
         let settings = |profile| serde_json::to_value(profile).expect("a profile is plain data");
         let (mut own, usual) = (settings(*self), settings(TrafficProfile::default()));

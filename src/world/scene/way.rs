@@ -13,8 +13,8 @@ use avastra_road::{Heights, Lane, LaneIndex, RoadMap, SignKind, StopLine, Turn};
 use super::junction::{Area, ConflictAreas};
 use avastra_lang::model::body::BodyParameters;
 
-/// Objects farther away than this are not sensed at all, m: the clear-day range for cars of the LiDAR and the camera that
-/// driving systems are given. Beyond the end of a way it is asked that far whether other lanes go on there.
+/// Objects farther away than this are not sensed at all, m. It is the clear-day range for cars of the LiDAR and the
+/// camera that driving systems are given. Beyond the end of a way it is asked that far whether other lanes go on there.
 pub const RANGE_M: f64 = 120.0;
 
 /// Lateral acceleration that other drivers accept in a bend, m/s²: upper end of comfort.
@@ -26,12 +26,12 @@ const BEND_BRAKING_MPS2: f64 = 2.0;
 /// A way reaches at least this far beyond the lanes it was asked for, if the road does, m.
 const REACH_M: f64 = 400.0;
 
-/// A way that is prolonged keeps at least so much behind a vehicle, m: more than the longest body has
-/// behind its centre, so that no rear axle leaves its bend.
+/// A way that is prolonged keeps at least so much behind a vehicle, m. It is more than the longest body has behind its
+/// centre, so that no rear axle leaves its bend.
 const BEHIND_M: f64 = 15.0;
 
-/// Step and room of the search for lanes beyond the end of a way, m: a way that goes on beside a lane is not
-/// free. Ours.
+/// Step and room of the search for lanes beyond the end of a way, m. A way that goes on beside a lane is not free.
+/// Ours.
 const BEYOND_STEP_M: f64 = 6.0;
 const BEYOND_ROOM_M: f64 = 4.5;
 
@@ -70,8 +70,8 @@ pub(crate) struct Way {
     speeds_mps_max: Vec<f64>,
     /// Whether lanes go on where it ends.
     open: bool,
-    /// Where a vehicle that does not turn off must stop, m: a closed way goes on straight beyond its end, as
-    /// a road does beyond the edge of a map, but not into other lanes.
+    /// Where a vehicle that does not turn off must stop, m. A closed way goes on straight beyond its end, as a road
+    /// does beyond the edge of a map, but not into other lanes.
     pub end_m: Option<f64>,
 }
 
@@ -106,8 +106,8 @@ impl Way {
         Way::turning(roads, lanes, None, rng).map(|(way, _)| way)
     }
 
-    /// As [`Way::along`], but at the first junction after `lanes` to where it is asked to go; and the lane in which it goes
-    /// there, if the last of them leads there.
+    /// As [`Way::along`], but turns as asked at the first junction after `lanes`. Also returns the lane in which it
+    /// turns there, if the last of `lanes` leads there.
     pub fn turning(
         roads: &Roads,
         lanes: &[LaneIndex],
@@ -245,8 +245,8 @@ impl Way {
         leads_through(map, after.lane, to).then_some(after.lane)
     }
 
-    /// Whether the last lane before that junction leads there, and a vehicle of this speed can slow down to what the bend
-    /// allows, as gently as drivers do before bends.
+    /// Whether the last lane before that junction leads there, and a vehicle of this speed can slow down enough for the
+    /// bend. It must brake as gently as drivers do before bends.
     ///
     /// # Errors
     /// That it does not, in words.
@@ -284,8 +284,8 @@ impl Way {
         Some((Way::along(roads, &rest, rng)?, station_m - self.lanes[first].from_m))
     }
 
-    /// As [`Way::prolonged`], but laid anew from the first junction beyond a front on, where it goes to where it is asked; and
-    /// the lane in which it does.
+    /// As [`Way::prolonged`], but laid anew from the first junction beyond a front on, where it turns as asked. Also
+    /// returns the lane in which it does.
     pub fn turned(
         &self,
         roads: &Roads,
@@ -307,7 +307,8 @@ impl Way {
     }
 }
 
-/// Whether a vehicle may go on from one lane to the next: nobody turns into a bus lane, unless nothing else is left.
+/// Whether a vehicle may go on from one lane to the next: no vehicle turns into a bus lane, unless nothing else is
+/// left.
 fn is_open(map: &RoadMap, from: LaneIndex, next: LaneIndex) -> bool {
     map.lane(from).for_buses || !map.lane(next).for_buses
 }
@@ -338,7 +339,7 @@ fn turns(map: &RoadMap, from: LaneIndex, to: Turning) -> impl Iterator<Item = La
     })
 }
 
-/// Where somebody turns, as in "does not lead to the left".
+/// The direction of a turn, as in "does not lead to the left".
 pub(crate) fn in_words(to: Turning) -> &'static str {
     match to {
         Turning::Left => "to the left",
@@ -347,13 +348,13 @@ pub(crate) fn in_words(to: Turning) -> &'static str {
     }
 }
 
-/// Where the outline's centre of a body is that has driven to a station of a way, and its wheelbase: both axles are on the
-/// way.
+/// The pose of the outline's centre of a body that has driven to a station of a way, and its wheelbase. Both axles are
+/// on the way.
 ///
-/// The station is that of the rear axle plus the distance from there to the centre, so on a straight
-/// way it is the centre's. In a bend the body is a chord of the way: its middle cuts the bend, and its
-/// tail swings out less than if the body turned about its centre. A real rear axle cuts a bend farther;
-/// its driver swings out before to stay in the lane, which is not modelled.
+/// The station is that of the rear axle plus the distance from there to the centre, so on a straight way it is the
+/// centre's. In a bend the body is a chord of the way. Its middle cuts the bend, and its tail swings out less than if
+/// the body turned about its centre. A real rear axle cuts a bend farther; its driver swings out before to stay in the
+/// lane, which is not modelled.
 pub(crate) fn body_at(path: &Path, station_m: f64, body: &BodyParameters) -> (Pose, Chord) {
     let rear_m = station_m - body.rear_axle_m;
     let wheelbase = path.chord(rear_m, rear_m + body.wheelbase_m);
@@ -412,8 +413,8 @@ fn free_end_m(map: &RoadMap, path: &Path) -> Option<f64> {
 
 /// The speed of the bend at each vertex, lowered so that braking for the next ones stays gentle.
 ///
-/// `ads::kit::Guide` has a pass of its own over even samples of the route, with a driving system's limits.
-/// The two are not one function because their vertices lie elsewhere, so results would change.
+/// `ads::kit::Guide` has a separate pass over even samples of the route, with a driving system's limits. The two are
+/// not one function because their vertices lie elsewhere, so results would change.
 fn bend_speeds_mps(path: &Path) -> Vec<f64> {
     let points = path.points();
     let mut speeds: Vec<f64> =

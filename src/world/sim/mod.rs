@@ -20,9 +20,9 @@
 //!
 //! | module | what it has |
 //! |---|---|
-//! | `scene` | what stays in all episodes of a road: the map, the `way`s on it, where lanes cross and which goes first (`junction`), the route, and the manners that a run can change (`traffic`) |
+//! | `scene` | the same in all episodes of a road: the map, the `way`s on it, where lanes cross and which goes first (`junction`), the route, and the traffic profile (`traffic`) |
 //! | `state` | plain data of a moment, and what follows from one piece of it alone |
-//! | `view` | questions that change nothing: the world as one road user sees it (`around`), facts (`moment`, `watched`, `encroachment`), lines of sight, how much room a careful driver needs (`safety`) |
+//! | `view` | read-only questions: the world as one road user sees it (`around`), facts (`moment`, `watched`, `encroachment`), lines of sight, a careful driver's room (`safety`) |
 //! | `behave` | what a road user does next, by its view and its own memory; who of two goes first |
 //! | `place` | where a newcomer appears, or why it cannot |
 //! | `step` | how one moment becomes the next |

@@ -83,7 +83,7 @@ pub fn world(scene: &Arc<Scene>) -> World {
     World::new(Arc::clone(scene), &start())
 }
 
-/// Two lanes each way along +x for 600 m; the route runs on the inner one (y = -1.75) from x = 100 to x = 500.
+/// Two lanes each way along +x for 600 m. The route runs on the inner one (y = -1.75) from x = 100 to x = 500.
 pub fn straight() -> Arc<Scene> {
     along_x(&[2, 1, -1, -2].map(plain), "")
 }
@@ -94,15 +94,15 @@ pub fn changing() -> Arc<Scene> {
     scene(&street("1", [0.0, 0.0, 0.0, 600.0], "-1", "", &of, ""), ("1", -2, 100.0), ("1", -1, 500.0))
 }
 
-/// A street of 600 m along +x with these lanes and what else stands in it; the route leads from x = 100 to x = 500.
+/// A street of 600 m along +x with these lanes and other objects in it. The route leads from x = 100 to x = 500.
 fn along_x(of: &[(i32, &str, f64, &str)], more: &str) -> Arc<Scene> {
     let road = street("1", [0.0, 0.0, 0.0, 600.0], "-1", "", &lanes(of), more);
     scene(&road, ("1", -1, 100.0), ("1", -1, 500.0))
 }
 
-/// The way of the ego vehicle (y = -1.75, from x = 100 to x = 500) is crossed from the right by a
-/// lane at x = 300, to the right of which a second lane ends at the junction. Signal 0 is the ego
-/// vehicle's, signal 1 the other's; both stop lines are 15 m before the crossing.
+/// The way of the ego vehicle (y = -1.75, from x = 100 to x = 500) is crossed from the right by a lane at x = 300. To
+/// the right of that lane, a second lane ends at the junction. Signal 0 is the ego vehicle's, signal 1 the other's;
+/// both stop lines are 15 m before the crossing.
 pub fn crossing() -> Arc<Scene> {
     crossing_of("1000001", "1000001")
 }
@@ -164,16 +164,16 @@ pub fn overpass(height_m: f64) -> Arc<Scene> {
     scene(&roads.concat(), ("1", -1, 100.0), ("1", -1, 500.0))
 }
 
-/// A street of 600 m along +x with a lane each way that climbs at 10 %; the route leads from x = 100 to x = 500.
+/// A street of 600 m along +x with a lane each way that climbs at 10 %. The route leads from x = 100 to x = 500.
 pub fn hill() -> Arc<Scene> {
     let climbs = r#"<elevationProfile><elevation s="0" a="20" b="0.1"/></elevationProfile>"#;
     along_x(&[1, -1].map(plain), climbs)
 }
 
-/// A street from west (road 1) to east (road 3) through a junction at the origin, with a lane each way, 200 m
-/// to each side. The ego vehicle comes from the west, 100 m before the junction, and goes straight on (through
-/// road 2) or turns left to the north (road 5). A vehicle from the east goes straight on or turns left to the
-/// south (through road 8). All have the same light.
+/// A street from west (road 1) to east (road 3) through a junction at the origin. It has a lane each way, 200 m to each
+/// side. The ego vehicle comes from the west, 100 m before the junction. It goes straight on (through road 2) or turns
+/// left to the north (road 5). A vehicle from the east goes straight on or turns left to the south (through road 8).
+/// All have the same light.
 pub fn oncoming(heading: Heading) -> Arc<Scene> {
     let (both, one) = (lanes(&[plain(1), plain(-1)]), lanes(&[plain(-1)]));
     let through = lanes(&[(1, "driving", 3.5, link(1, 1).as_str()), THROUGH]);

@@ -1,4 +1,4 @@
-//! What road users do: every verb on a hand-made road, and what must hold of all of them.
+//! Behaviour of road users: every verb on a hand-made road, and the properties that all of them share.
 
 mod levels;
 mod told;
@@ -102,7 +102,7 @@ fn impossible_spawns_are_refused() {
         let refusal = world.survey(&beside).expect_err("the lane is the ego vehicle's own");
         assert_eq!(refusal, "in the ego vehicle's own lane nobody begins beside it");
     }
-    // Everybody may follow a trajectory, and this road has none.
+    // Every body may follow a trajectory, and this road has none.
     let follows = SpawnRequest { verb: Verb::Follow, ..ahead };
     assert_eq!(world.survey(&follows).expect_err("no such way"), "it follows no trajectory");
     for verb in Verb::ALL.iter().filter(|verb| **verb != Verb::Follow) {
@@ -517,7 +517,7 @@ fn who_takes_its_right_does_not_save_an_ego_vehicle_that_runs_a_red_light() {
                 } else {
                     hold(&world, 12.0)
                 });
-                // Only those who cross: whoever drives ahead is rammed by an ego vehicle that looks at nobody.
+                // Only crossing road users count: an ego vehicle that ignores others rams a vehicle that drives ahead.
                 has_crashed = contacts.iter().any(|contact| contact.obstacle_velocity_mps.y.abs() > 1.0);
             }
             has_crashed
@@ -630,6 +630,6 @@ fn every_verb_has_its_place_on_road_2() {
         }
         assert!(world.ego_offset_m().abs() < 0.1, "it drives on the route");
     }
-    // Without a trajectory nobody follows one.
+    // Without a trajectory no road user follows one.
     assert_eq!(found.len(), 4 * (Verb::ALL.len() - 1), "{found:?}");
 }

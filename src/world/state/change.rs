@@ -1,4 +1,4 @@
-//! Where a driver is on its way to the side: a lane change that is planned or under way, and a place beside the middle of its
+//! The lateral moves of a driver: a lane change that is planned or under way, and an offset from the middle of its
 //! lane.
 
 use std::sync::Arc;
@@ -87,7 +87,7 @@ impl Change {
     }
 }
 
-/// What is left of a change that is broken off: it swings to its end, while the one that leads back takes it back.
+/// The rest of an aborted change. The change swings to its end, while the move back undoes it.
 #[derive(Debug, Clone, Copy)]
 pub struct BrokenOff {
     /// From where it was broken off; above 1 it is over.
@@ -110,7 +110,7 @@ pub struct Aside {
     /// m to the left of the middle of its lane.
     pub wanted_m: f64,
     pub now_m: f64,
-    /// How it goes there; without it as in lane changes of its own.
+    /// The ordered speed or duration of the move; without it the driver moves as in a lane change by itself.
     pub told: Option<AsideBy>,
     pub shift: Option<Shift>,
 }

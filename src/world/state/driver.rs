@@ -60,13 +60,13 @@ pub struct Driver {
     /// Ticks at rest because of others.
     pub waited_ticks: u32,
     pub change: Option<Change>,
-    /// What it was told to do to the side, if it was told something.
+    /// Its lateral order, if it has one.
     pub aside: Option<Box<Aside>>,
     /// The rules of the road that it was told to ignore.
     pub ignores: IgnoredRules,
     /// Whether it is an emergency vehicle under way: it passes lights and signs, and all others wait for it.
     pub has_siren: bool,
-    /// What it was told to do beside the ego vehicle. It says the speed, in place of `cruise_mps`.
+    /// Its order relative to the ego vehicle. It says the speed, in place of `cruise_mps`.
     pub pursuit: Option<Box<Pursuit>>,
     /// By how much it missed the moment of its last `early`, s; below 0 if it was too soon.
     pub late_s: Option<f64>,
@@ -81,7 +81,7 @@ pub struct Driver {
     pub draws: u32,
 }
 
-/// What is in front: another road user, or a line to stop at.
+/// The road user in front, or a line to stop at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Leader {
     pub gap_m: f64,
@@ -214,7 +214,7 @@ impl Driver {
         self.aside = (left_m != 0.0).then(aside);
     }
 
-    /// What it is from now on, by its spawn or an order.
+    /// Takes on the properties that its spawn or an order tells.
     pub fn heed(&mut self, told: &Fields<Said>) {
         self.ignores = told.ignores().unwrap_or(self.ignores);
         self.has_siren = told.siren().unwrap_or(self.has_siren);
@@ -274,7 +274,8 @@ impl Driver {
         self.is_now_aside(left_m);
     }
 
-    /// How far to the side it gets if the middle of its lane moves `over`, and it ends so far to the left of it, m.
+    /// How far to the side it gets, m, if the middle of its lane moves `over`, and it ends `ends_m` to the left of
+    /// that.
     pub fn over_m(&self, over: Vec2, ends_m: f64) -> f64 {
         let now_m = self.aside_m();
         if ends_m == now_m {
@@ -288,7 +289,7 @@ traced! {
     Driver {
         station_m, speed_mps, cruise_mps, ordered_mps2, time_gap_s, aggression, leader, hold_m, insists_to_m, stopped_to_m,
         waited_ticks, change, aside, ignores => ignores.bits(), has_siren, pursuit, turn, last_change,
-        // What is planned was drawn as it appeared: how much of it is left tells the rest.
+        // The plan was drawn as the vehicle appeared: the part that is left of it tells the rest.
         plan => plan.len(), draws, limit_part, yields_to_ego
     } but {
         // It follows from where it appeared and from what it drew, changed and was told since.

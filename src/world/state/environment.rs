@@ -12,7 +12,7 @@
 //! | friction | new tyres at 50, 90, 130 km/h and 0, 0.2, 1, 2 mm | Bosch, Automotive Handbook; between its columns the mapping 0.1, 0.5, 1.5 mm to 0.70, 0.60, 0.52 is ours | here |
 //! | braking | min(brakes, μ·g), forces inside the friction circle | physics | `step::ego`, `view::around` |
 //! | light | 0.8, 1, 0.15 of a camera's light by morning, noon, night, 0.4 in twilight | ours: a low sun costs contrast, street lamps leave the range of low beams | here |
-//! | headlights | on from dusk to dawn, but for who ignores `Headlights`: seen in the dark no farther than a pedestrian's share of a camera's range | Vienna Convention on Road Traffic, article 32; the share is ours | `ads::modular::perception`, `drivers::kit` |
+//! | headlights | on from dusk to dawn, unless the vehicle ignores `Headlights`: then seen in the dark no farther than a pedestrian's share of a camera's range | Vienna Convention on Road Traffic, article 32; the share is ours | `ads::modular::perception`, `drivers::kit` |
 //! | sight through fog and rain | R·e^(σR) = R₀, σ = 2.996 / MOR (Koschmieder) + 1.076·R^0.67 dB/km (Carbonneau) | as named | `ads::modular::perception` |
 //! | detection by class, position noise | ranges of LiDAR and camera for cars and pedestrians, noise per metre | as `scenarios/ads/default.yaml` says | `ads::modular::perception` |
 //! | night | camera ranges fall with the light, LiDAR's do not | ours: low beams leave 40 % on pedestrians, 70 % on lit vehicles | `ads::modular::perception` |
@@ -28,8 +28,8 @@ use avastra_lang::model::vocabulary::{Level, Phenomenon, TimeOfDay};
 use crate::state::sensed::Conditions;
 use crate::state::trace::traced;
 
-/// A camera's light, 1 at noon. Ours: a low sun costs a camera some contrast, twilight lies between it and night, and
-/// street lamps leave it the recognition range that low beams give (35 to 50 %) on few pixels.
+/// A camera's light, 1 at noon. Ours: a low sun costs a camera some contrast, and twilight lies between it and night.
+/// Street lamps leave it the recognition range that low beams give (35 to 50 %) on few pixels.
 fn light(time: TimeOfDay) -> f64 {
     match time {
         TimeOfDay::Morning => 0.8,
@@ -48,11 +48,11 @@ const VISIBILITY_M: [f64; 4] = [10_000.0, 500.0, 150.0, 50.0];
 /// columns.
 const WATER_MM: [f64; 4] = [0.0, 0.1, 0.5, 1.5];
 
-/// Time in which a road drains to a third, s. Under steady rain the depth tends to rain times this:
-/// 0.1 mm at 2.5 mm/h, 0.4 mm at 10 mm/h and 2 mm, which are puddles, at 50 mm/h; so light rain keeps
-/// the wetness of its own level (0.1 mm / 2.5 mm/h = 144 s), and the other two stay near theirs.
+/// Time in which a road drains to a third, s. Under steady rain the depth tends to rain times this: 0.1 mm at 2.5 mm/h,
+/// 0.4 mm at 10 mm/h, and 2 mm, which are puddles, at 50 mm/h. So light rain keeps the wetness of its level (144 s =
+/// 0.1 mm / 2.5 mm/h). The other two stay near theirs.
 const DRAIN_S: f64 = 144.0;
-/// What evaporates from a wet road, mm/h. Ours: open water loses 3 to 5 mm on a summer's day.
+/// Evaporation from a wet road, mm/h. Ours: open water loses 3 to 5 mm on a summer's day.
 const DRYING_MMPH: f64 = 0.3;
 const S_PER_H: f64 = 3600.0;
 
@@ -75,7 +75,7 @@ const FRICTION_MIN: f64 = 0.05;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Environment {
     pub time: TimeOfDay,
-    /// Of rain, fog and wetness.
+    /// The levels of rain, fog and wetness.
     pub sky: [Level; 3],
     water_mm: f64,
     /// The friction on a road with that water.
@@ -113,7 +113,7 @@ impl Environment {
         &self.grip
     }
 
-    /// What holds for an ego vehicle at a speed.
+    /// The conditions for an ego vehicle at a speed.
     pub fn conditions(&self, ego_mps: f64) -> Conditions {
         let [rain, fog, _] = self.sky;
         Conditions {
@@ -222,7 +222,7 @@ mod tests {
         downpour.set(Phenomenon::Rain, High);
         assert!((after(downpour, 60) - 0.67).abs() < 0.02, "{}", after(downpour, 60));
         assert!((after(downpour, 1500) - 1.99).abs() < 0.02);
-        // Each rain keeps about the wetness of its own level.
+        // Each rain keeps about the wetness of its level.
         for (level, water_mm) in [(Light, 0.09), (Moderate, 0.39), (High, 1.99)] {
             assert!((after(noon([level, None, level]), 1500) - water_mm).abs() < 0.01, "{level:?}");
         }

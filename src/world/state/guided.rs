@@ -1,4 +1,4 @@
-//! Who follows a trajectory: where it is on it, and what it was told.
+//! A road user on a trajectory: its station there, and its orders.
 
 use std::sync::Arc;
 
@@ -49,7 +49,7 @@ impl Guided {
         }
     }
 
-    /// Of a body, from the point that follows the way to the middle of the outline, m.
+    /// The distance from the point of a body that follows the way to the middle of the outline, m.
     pub fn to_middle_m(is_vehicle: bool, size: &BodyParameters) -> f64 {
         if is_vehicle { size.rear_axle_m } else { 0.0 }
     }
@@ -134,6 +134,6 @@ traced! {
         late_s
     };
     Shift { from_m, to_m, takes_s, since_s };
-    // What the ego vehicle has kept moves nothing: only `late_s` comes of it.
+    // `ego_keeps` moves nothing: only `late_s` depends on it.
     Meeting { ego_m, early_s, reach_m, mps, steady_m, stage } but { ego_keeps };
 }

@@ -50,7 +50,7 @@ impl Running {
 pub struct Tracked {
     pub course: Arc<Course>,
     pub phase: usize,
-    /// What it told first.
+    /// The command at its beginning.
     pub first: Command,
 }
 

@@ -1,5 +1,5 @@
-//! Plain data of a moment, each with what follows from it alone: the world, the ego vehicle, road users and what moves them, weather,
-//! lights, time, what is sensed, and the digest over all of it.
+//! Plain data of a moment, each with what follows from it alone. Its parts are the world, the ego vehicle, road users
+//! and what moves them, weather, lights, time, what is sensed, and the digest over all of it.
 
 pub mod ambient;
 pub mod change;

@@ -14,7 +14,7 @@ pub const SIDEWAYS_MPS: f64 = 0.15;
 /// A road user other than the ego vehicle, as others may see it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Obstacle {
-    /// From 1, in order of appearance; ambient traffic has numbers of its own.
+    /// From 1, in order of appearance; ambient traffic has separate numbers.
     pub id: u32,
     pub body: Body,
     pub colour: Colour,
@@ -36,7 +36,7 @@ pub struct Obstacle {
     /// Gap between its outline and the ego vehicle's, m; 0 if they touch.
     pub distance_m: f64,
     pub spawned_tick: u64,
-    /// What it was told to show.
+    /// The lights that it was told to show.
     pub lights: ShownLights,
 }
 

@@ -5,7 +5,7 @@ use avastra_road::{LaneIndex, RoadMap, SignKind};
 
 use crate::state::trace::traced;
 
-/// What a light showed as a vehicle passed it.
+/// The colour of a light as a vehicle passed it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shown {
     Free,
@@ -100,7 +100,7 @@ pub enum Stop {
 traced!(enum Shown);
 
 traced! {
-    // What is known of signs follows from what was traced before.
+    // The facts about signs follow from what was traced before.
     Passed { light } but { sign, stand };
     PassedLight { signal, shown };
 }

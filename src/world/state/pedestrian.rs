@@ -1,10 +1,10 @@
-//! Somebody who crosses the road.
+//! A pedestrian who crosses the road.
 
 use avastra_base::geometry::{Pose, Vec2};
 
 use crate::state::trace::traced;
 
-/// What a pedestrian does when a vehicle comes near.
+/// The behaviour of a pedestrian when a vehicle comes near.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Manner {
     Steady,

@@ -1,4 +1,4 @@
-//! What a driver was told to do beside another one, and how far it is with it.
+//! A driver's order relative to another road user, and its progress.
 
 use avastra_lang::model::command::Command;
 use avastra_road::LaneIndex;
@@ -23,8 +23,8 @@ pub struct Pursuit {
 pub enum Aim {
     /// To the road user of that id, or to the ego vehicle.
     Gap(Gap, Option<u32>),
-    /// Its front is there so much before that of the ego vehicle, s: at this station of the ego vehicle's route, or where its way
-    /// crosses that.
+    /// Its front is there this much before the ego vehicle's front, s. The place is this station of the ego vehicle's
+    /// route, or the point where its way crosses that route.
     Place { early_s: f64, station_m: Option<f64> },
 }
 

@@ -1,4 +1,4 @@
-//! What is remembered of a road user and the ego vehicle, as far as priority depends on it.
+//! The memory of a road user and the ego vehicle, as far as priority depends on it.
 
 use avastra_base::geometry::Vec2;
 use avastra_lang::model::vocabulary::Priority;
@@ -9,11 +9,11 @@ use crate::state::ruling::{Rule, Ruling};
 use crate::state::time::DT_S;
 use crate::state::trace::{Trace, Traced, traced};
 
-/// What was found holds for so long after the two have left each other's way, s. Ours: outlines that touch behind
-/// a junction do so because of what happened in it.
+/// A ruling holds for this long after the two have left each other's way, s. Ours: outlines that touch behind a
+/// junction do so because of what happened in it.
 const HOLDS_S: f64 = 2.0;
 
-/// What is remembered of a road user and the ego vehicle, as far as priority depends on it.
+/// The memory of a road user and the ego vehicle, as far as priority depends on it.
 #[derive(Debug, Clone, Default)]
 pub struct Rights {
     /// The lines that the road user passed last.
@@ -22,7 +22,7 @@ pub struct Rights {
     /// the first look.
     pub shares: Option<bool>,
     pub meeting: Option<Meeting>,
-    /// Who has priority if it is a wreck in the ego vehicle's way, and since when, s; `None` if it is not.
+    /// The priority if it is a wreck in the ego vehicle's way, and since when, s; `None` if it is not.
     pub wreck: Option<(Priority, f64)>,
     /// Whether it came into the ego vehicle's way, or the ego vehicle into its, and left room.
     pub left_room: bool,
@@ -33,13 +33,13 @@ pub struct Rights {
 }
 
 impl Rights {
-    /// Who goes first, as long as what was found about the two holds.
+    /// The priority, as long as the ruling on the two holds.
     pub fn now(&self, tick: u64) -> Priority {
         let wreck = self.wreck.map(|(priority, _)| priority);
         wreck.or(self.held(tick).map(|ruling| ruling.priority)).unwrap_or(Priority::None)
     }
 
-    /// What was found about the two, as long as it holds.
+    /// The ruling on the two, as long as it holds.
     pub fn held(&self, tick: u64) -> Option<Ruling> {
         self.meeting.filter(|meeting| meeting.holds(tick)).map(|meeting| meeting.ruling)
     }
@@ -91,7 +91,7 @@ pub enum Place {
 }
 
 traced! {
-    // What was found on the road follows from the pedestrian's position.
+    // `on_road` follows from the pedestrian's position.
     Rights { passed, shares, meeting, wreck, left_room, foreseen } but { on_road };
     // Whether a vehicle waits, and how long it rests, follow from what was traced before.
     Meeting { place, ruling, tick } but { waits, rests_s };

@@ -33,7 +33,7 @@ pub struct Mover {
     pub rest_ticks: u32,
     /// Part of it that the ego vehicle's sensors saw when they last looked.
     pub visible_fraction: f64,
-    /// Who is near it, and how far the next one is.
+    /// The road users near it, and the distance to the next one.
     pub room: Room,
     /// Which of the two has priority: it or the ego vehicle.
     pub rights: Rights,
@@ -167,8 +167,8 @@ pub struct Room {
     pub gap_m: f64,
     /// [`Travel::done_m`] at that moment.
     pub since_m: f64,
-    /// How many road users there were, and the ids of the next newcomers, by an action and in ambient traffic: nobody has come or
-    /// gone while all three are the same.
+    /// How many road users there were, and the ids of the next newcomers, by an action and in ambient traffic. While
+    /// all three are the same, no road user has come or gone.
     pub among: (usize, u32, u32),
 }
 

@@ -2,8 +2,8 @@
 
 use avastra_lang::model::vocabulary::Priority;
 
-/// The rules by which priority is decided. Articles are those of the Vienna Convention on Road Traffic (1968); "of the signs" means
-/// the Convention on Road Signs and Signals of the same year.
+/// The rules by which priority is decided. Articles are those of the Vienna Convention on Road Traffic (1968). "Of the
+/// signs" means the Convention on Road Signs and Signals of the same year.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rule {
     /// Neither came into the other's way by any of these rules.
@@ -110,7 +110,7 @@ impl Rule {
     }
 }
 
-/// Whose motion decided: who came into the other's way.
+/// The road user whose motion decided: it came into the other's way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mover {
     Ego,
@@ -129,7 +129,7 @@ impl Mover {
     }
 }
 
-/// Who has priority, and why.
+/// The priority, and its reason.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Ruling {
     pub priority: Priority,
@@ -161,7 +161,7 @@ impl Ruling {
         }
     }
 
-    /// Who has priority, and why, in a sentence without a full stop: `the other had priority: …`.
+    /// The priority and its reason, in a sentence without a full stop: `the other had priority: …`.
     pub fn describe(&self) -> String {
         let who = match self.priority {
             Priority::Ego => "the ego vehicle had priority",

@@ -1,9 +1,9 @@
-//! What the ego vehicle's sensors are given, as plain data.
+//! The input of the ego vehicle's sensors, as plain data.
 
 use avastra_base::geometry::{Pose, Vec2};
 use avastra_lang::model::vocabulary::{Body, ShownLights};
 
-/// What the sensors give in one tick.
+/// The output of the sensors in one tick.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensed {
     /// Since the start of the episode, s.

@@ -1,10 +1,9 @@
 //! Traffic signals: each junction runs a fixed cycle over its groups.
 //!
-//! A group is green for 12 s and yellow for 3 s, then all are red for 2 s and the next group follows
-//! (yellow 3 to 4 s and all-red 1 to 2 s are usual in towns; the green is ours). Where so many groups
-//! follow each other that the cycle would last longer than two minutes, the greens are shorter, down to
-//! 5 s. A road may say other times. Counted in ticks, so that the colour of any moment is exact. No vehicle
-//! detection, no pedestrian lights.
+//! A group is green for 12 s and yellow for 3 s, then all are red for 2 s and the next group follows. In towns yellow
+//! of 3 to 4 s and all-red of 1 to 2 s are usual; the green is ours. Where so many groups follow each other that the
+//! cycle would last longer than two minutes, the greens are shorter, down to 5 s. A road may say other times. Counted
+//! in ticks, so that the colour of any moment is exact. No vehicle detection, no pedestrian lights.
 
 use std::sync::Arc;
 
@@ -60,7 +59,7 @@ pub(crate) struct SignalClock {
     program: Program,
 }
 
-/// What every signal shows, and until when.
+/// The colour of every signal, and until when it shows it.
 #[derive(Debug, Clone)]
 pub(crate) struct Colours {
     /// By index in `RoadMap::signals`.

@@ -1,4 +1,4 @@
-//! Somebody who walks along the road.
+//! A pedestrian who walks along the road.
 
 use crate::state::trace::traced;
 

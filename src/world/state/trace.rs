@@ -1,9 +1,10 @@
 //! The digest of all states of a world, tick after tick.
 //!
 //! Every tick gives some two hundred words, so a word may cost a few instructions. SHA-256 takes two hundred a word
-//! where the processor has none of its own; here it closes a digest once a step. What comes before is made to notice
-//! accidents, not to resist forgery: two streams that first differ in one word always have different lanes after it,
-//! because each step of a lane can be undone, and what follows brings them together again by chance of 2⁻⁶⁴ alone.
+//! where the processor has no instructions for it; here it closes a digest once a step. The lanes, which take the words
+//! before, are made to notice accidents, not to resist forgery. Two streams that first differ in one word always have
+//! different lanes after it, because each step of a lane can be undone. The words that follow bring them together again
+//! by chance of 2⁻⁶⁴ alone.
 
 use std::sync::Arc;
 
@@ -44,7 +45,8 @@ impl Trace {
         self.words += 1;
     }
 
-    /// A number, bit by bit, but both zeros alike: which of them `f64::max` and the like give is left to the compiler.
+    /// A number, bit by bit, but with one pattern for both zeros: which of them `f64::max` and similar functions give
+    /// is left to the compiler.
     #[inline]
     pub fn number(&mut self, number: f64) {
         self.word((number + 0.0).to_bits());

@@ -46,8 +46,8 @@ pub struct Start {
     pub signal_phase_s: f64,
     /// Seed of the choices of other road users.
     pub seed: u64,
-    /// Which of the moments of a frame (0.1 s) each of them looks at the world in: 0 by their numbers, otherwise by chance
-    /// from this seed. So others react by up to a frame sooner or later.
+    /// The moment of a frame (0.1 s) in which each of them looks at the world. With 0 it follows from their numbers,
+    /// otherwise it is drawn from this seed. So others react by up to a frame sooner or later.
     pub reactions: u64,
     /// Vehicles of ambient traffic that are kept around the ego vehicle, at most `model::AMBIENT_MAX`.
     pub ambient: u32,
@@ -75,7 +75,7 @@ impl Start {
     }
 }
 
-/// What a traffic light was told to show, once the ego vehicle's front is at that station.
+/// The colour ordered for a traffic light, once the ego vehicle's front is at that station.
 #[derive(Debug, Clone, Copy)]
 pub struct Switch {
     /// In `RoadMap::signals`.
@@ -103,9 +103,9 @@ pub struct World {
     pub(crate) environment: Environment,
     pub(crate) conditions: Conditions,
     pub(crate) signals: SignalClock,
-    /// What they show in this tick.
+    /// The colours that they show in this tick.
     pub(crate) colours: Colours,
-    /// What a light was told to show.
+    /// The order to a light.
     pub(crate) switch: Option<Switch>,
     /// In order of appearance.
     pub(crate) users: Vec<RoadUser>,
@@ -118,7 +118,7 @@ pub struct World {
     /// Seed of the choices of other road users, and that of when they look.
     pub(crate) seed: u64,
     pub(crate) reactions: u64,
-    // What the last tick has to tell. No later tick reads it.
+    // The contacts of the last tick. No later tick reads it.
     pub(crate) contacts: Vec<Contact>,
     pub(crate) incidents: Vec<Incident>,
     /// The clocks of the lights before orders moved them, and up to which tick each counted: what was shown in the past. No tick
@@ -206,8 +206,8 @@ impl World {
         user.map_or(PhaseCount::default(), |user| user.mover.phases)
     }
 
-    /// The phase that the road user with an id is in: its manoeuvre, by its index in the space, its number from 1, and the tick
-    /// in which it began.
+    /// The phase that the road user with an id is in. It has its manoeuvre, by its index in the space, its number from
+    /// 1, and the tick in which it began.
     pub fn phase(&self, id: u32) -> Option<(usize, u32, u64)> {
         let user = self.user(id)?;
         user.mover.course.as_ref()?.under_way()
@@ -263,8 +263,8 @@ impl World {
         self.ego_front_m() >= self.scene.route.goal_m - 1.0
     }
 
-    /// Whether the ego vehicle is in a junction that it was not allowed to enter: at red, late at yellow, or past a stop sign
-    /// without having stood.
+    /// Whether the ego vehicle is in a junction that it was not allowed to enter. It entered at red, late at yellow, or
+    /// past a stop sign without having stood.
     pub fn ego_runs_signal(&self) -> bool {
         self.ego_passed.is_running_signal(&self.scene.map, &self.ego.outline)
     }

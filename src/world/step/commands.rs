@@ -1,4 +1,4 @@
-//! What actions do to the world: weather, newcomers, orders, and the manoeuvres that go on from tick to tick.
+//! Effects of actions on the world: weather, newcomers, orders, and the manoeuvres that go on from tick to tick.
 
 use std::sync::Arc;
 
@@ -244,7 +244,7 @@ impl World {
                 mover.phases.all = mover.phases.begun + next.phases();
             }
             let tracked = rest.as_ref().and_then(|rest| rest.tracked(&moment, progress.moves));
-            // What a phase tells now may leave the speed to one before it.
+            // The command of a phase may leave the speed to an earlier phase.
             let command = match (command, tracked) {
                 (Some(mut command), Some(tracked)) if !command.says(Field::Speed) => {
                     for field in [Field::Speed, Field::Rate] {
@@ -260,7 +260,7 @@ impl World {
                 command.to().map(|who| self.bearer_id(who).filter(|id| *id != self.users[index].obstacle.id));
             let mover = &mut self.users[index].mover;
             match to {
-                // Without somebody to whom the gap would be kept that has no value.
+                // The command has no value while the road user to which it keeps a gap is absent.
                 Some(None) => mover.course = None,
                 to => {
                     mover.motion.order(&command, to.flatten(), self.ticks);
@@ -280,7 +280,7 @@ impl World {
             self.traffic.oldest_leaves_in_sight
                 || !around.is_in_sight(&user.obstacle, user.mover.visible_fraction)
         };
-        // What has a name is still wanted.
+        // A road user with a name is still wanted.
         let is_spare = |user: &RoadUser| user.mover.bearer.is_none() && is_hidden(user);
         let hidden = commanded.filter(|(_, user)| too_many > 0 && is_spare(user));
         let oldest: Vec<usize> = hidden.take(too_many).map(|(index, _)| index).collect();

@@ -1,8 +1,8 @@
 //! Contacts of the ego vehicle with obstacles, and what they do to it.
 //!
-//! Outlines are swept from tick to tick, so nothing passes through anything. The impact is plastic and acts across
-//! the gap that closed, as among obstacles (`incident`), so the bodies change their velocities as `oracle::severity` says,
-//! as far as a car can: no body is pushed backwards or sideways or turned, and a person that was hit stays in place.
+//! Outlines are swept from tick to tick, so nothing passes through anything. The impact is plastic and acts across the
+//! gap that closed, as among obstacles (`incident`). The bodies change their velocities as `oracle::severity` says, as
+//! far as a car can. No body is pushed backwards or sideways or turned, and a person that was hit stays in place.
 
 use avastra_base::geometry::{FirstContact, Sweep, Vec2, first_contact};
 
@@ -30,7 +30,7 @@ impl Party {
     }
 }
 
-/// The contact that begins within the tick after `tick`, if there is one, and the unit vector from the ego vehicle to
+/// The contact that begins within the tick after `tick`, if there is one. Also the unit vector from the ego vehicle to
 /// the obstacle across the gap that closed; a zero vector if they touched already.
 pub fn meet(
     ego: &Party,

@@ -30,8 +30,8 @@ impl Control {
     }
 }
 
-/// Throttle (%) and the acceleration it gives (m/s²): rounded from the calibration table at 6 to 10 m/s, from its
-/// dead zone to 80 %; above that the table gives less again.
+/// Throttle (%) and the acceleration it gives (m/s²). The values are rounded from the calibration table at 6 to 10 m/s,
+/// from its dead zone to 80 %; above that the table gives less again.
 const THROTTLE: [(f64, f64); 5] = [(15.7, 0.0), (20.0, 0.5), (40.0, 2.1), (60.0, 3.65), (80.0, 4.95)];
 
 /// Brake (%) and the deceleration it gives (m/s²), rounded likewise.
@@ -40,9 +40,9 @@ const BRAKE: [(f64, f64); 6] =
 
 /// Acceleration (m/s², negative brakes) that pedals give on a dry road, by Apollo's calibration table.
 ///
-/// The published rows end at 10 m/s. They scarcely change with the speed for the brake; for the throttle they
-/// rise in steps (60 % gives 1.0 m/s² below 2.4 m/s, 2.0 to 2.2 below 6.2 m/s, 3.5 and more above). One row for
-/// every speed is ours.
+/// The published rows end at 10 m/s. They scarcely change with the speed for the brake. For the throttle they rise in
+/// steps: 60 % gives 1.0 m/s² below 2.4 m/s, 2.0 to 2.2 below 6.2 m/s, 3.5 and more above. One row for every speed is
+/// ours.
 pub fn pedal_acceleration_mps2(throttle_pct: f64, brake_pct: f64) -> f64 {
     read(&THROTTLE, throttle_pct) - read(&BRAKE, brake_pct)
 }
@@ -120,10 +120,10 @@ impl Ego {
     }
 }
 
-/// What the tyres give of a wanted acceleration and curvature.
+/// The part of a wanted acceleration and curvature that the tyres give.
 ///
-/// Their force has at most the size μ·g. A demand beyond that keeps its direction and loses size, so
-/// that hard braking in a bend costs some of the bend and some of the braking.
+/// Their force has at most the size μ·g. A demand beyond that keeps its direction and loses size. So hard braking in a
+/// bend costs some of the bend and some of the braking.
 fn within_friction(forward_mps2: f64, curvature_per_m: f64, speed_mps: f64, friction: f64) -> (f64, f64) {
     let lateral_mps2 = speed_mps * speed_mps * curvature_per_m;
     let demand_mps2 = (forward_mps2 * forward_mps2 + lateral_mps2 * lateral_mps2).sqrt();
@@ -140,8 +140,8 @@ mod tests {
     use crate::sim::DT_S;
     use crate::state::environment::Grip;
 
-    /// The calibration of stopping distances: 30, 50 and 70 km/h on a dry, a wet (0.2 mm) and a flooded
-    /// (2 mm) road, against ∫ v / min(6, μ(v) g) dv and a lag of at most a quarter of a second.
+    /// The calibration of stopping distances: 30, 50 and 70 km/h on a dry, a wet (0.2 mm) and a flooded (2 mm) road.
+    /// The reference is ∫ v / min(6, μ(v) g) dv and a lag of at most a quarter of a second.
     #[test]
     fn stopping_distance_follows_speed_and_water() {
         let expected_m = |speed_mps: f64, water_mm: f64| {

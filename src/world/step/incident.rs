@@ -1,10 +1,10 @@
 //! Contacts among obstacles: where a motion ends at another obstacle, and what the impact does to both.
 //!
-//! Obstacles move one after another, each among the others as they stand at that moment. So no two can
-//! come to overlap, whatever the size of a step. The impact is plastic: across the gap that closed, both go
-//! on at the common speed that their momentum gives; along it each keeps its own. Then both slide straight
-//! on with locked wheels until friction stops them (`road_user`). Turning by the impact, bounce and damage
-//! are left out. Contacts with the ego vehicle are in `contact`.
+//! Obstacles move one after another, each among the others as they stand at that moment. So no two can come to overlap,
+//! whatever the size of a step. The impact is plastic. Across the gap that closed, both go on at the common speed that
+//! their momentum gives; along it each keeps its own. Then both slide straight on with locked wheels until friction
+//! stops them (`road_user`). Turning by the impact, bounce and damage are left out. Contacts with the ego vehicle are
+//! in `contact`.
 
 use avastra_base::geometry::{FirstContact, Frame, Pose, Sweep, Vec2, first_contact, wrap_angle};
 

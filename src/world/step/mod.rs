@@ -57,8 +57,8 @@ struct EgoTick {
 }
 
 impl World {
-    /// The beginning of an episode: the ego vehicle rolls with its rear axle on the start of
-    /// the route; beside ambient traffic, if asked for, nothing else is there.
+    /// The beginning of an episode: the ego vehicle rolls with its rear axle on the start of the route. Beside ambient
+    /// traffic, if asked for, nothing else is there.
     pub fn new(scene: Arc<Scene>, start: &Start) -> World {
         World::with_ego_at(scene, start, 0.0, start.ego_mps)
     }
@@ -102,9 +102,9 @@ impl World {
 
     /// Advances by [`DT_S`]; returns the contacts that began.
     ///
-    /// An obstacle that the ego vehicle touched once brakes to rest and touches it no more. Two obstacles
-    /// that touch each other slide to rest (see [`World::incidents`]). A wreck leaves when it has stood for
-    /// 2 s and the ego vehicle does not see it; so do drivers who waited for others for 20 s.
+    /// An obstacle that the ego vehicle touched once brakes to rest and touches it no more. Two obstacles that touch
+    /// each other slide to rest (see [`World::incidents`]). A wreck leaves when it has stood for 2 s and the ego
+    /// vehicle does not see it. A driver that waited for others for 20 s leaves under the same condition.
     pub fn tick(&mut self, control: &Control) -> &[Contact] {
         self.contacts.clear();
         self.incidents.clear();
@@ -317,7 +317,7 @@ impl World {
         self.ego_elevation_m = route.height_at(&self.scene.map, found.station_m);
         let passed = front_before_m..self.ego_front_m();
         if self.ticks < self.pushed_until {
-            // What another vehicle pushes over a line has not passed it.
+            // A vehicle that is pushed over a line by another one has not passed it.
             return;
         }
         let mut ego_passed = self.ego_passed;

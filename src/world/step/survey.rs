@@ -1,4 +1,4 @@
-//! What drawing asks a world: the facts of its moment, and where spawns would be put.
+//! The questions of drawing to a world: the facts of its moment, and where spawns would be put.
 
 use std::cell::OnceCell;
 

@@ -10,8 +10,8 @@ use avastra_lang::model::vocabulary::{Body, Colour, Verb};
 use avastra_road::LaneIndex;
 
 impl World {
-    /// Puts a sedan on a lane of a road, at a station of its way, with a speed that it keeps where it can; its
-    /// way leads through the other road. It does not yield to the ego vehicle.
+    /// Puts a sedan on a lane of a road, at a station of its way, with a speed that it keeps where it can. Its way
+    /// leads through the other road. It does not yield to the ego vehicle.
     pub fn put(&mut self, road: &str, lane: i32, through: &str, station_m: f64, speed_mps: f64) {
         let map = &self.scene.map;
         let first = map.place(road, lane, 100.0).expect("the lane is there").lane;

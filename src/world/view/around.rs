@@ -1,4 +1,4 @@
-//! What a road user may look at while it decides how to move.
+//! The view of a road user while it decides how to move.
 
 use avastra_base::geometry::{OrientedBox, Vec2};
 use avastra_base::kinematics::GRAVITY_MPS2;
@@ -18,18 +18,18 @@ use crate::state::time::DT_S;
 use crate::state::world::World;
 use avastra_lang::model::body::BodyParameters;
 
-/// A way within this distance of the route meets it or passes over it, m: three lanes, so that what drives beside
+/// A way within this distance of the route meets it or passes over it, m. It is three lanes, so that a vehicle beside
 /// the ego vehicle is on its level even if it passes over the route later.
 const LEVEL_ASIDE_M: f64 = 10.0;
-/// How far a way is followed until it comes near the route, in steps, m: as far as it matters to the ego vehicle,
-/// and less than any ramp needs to come around to a road that it passed over.
+/// How far a way is followed until it comes near the route, in steps, m. That is as far as it matters to the ego
+/// vehicle, and less than any ramp needs to come around to a road that it passed over.
 const LEVEL_STEP_M: f64 = 5.0;
 const LEVEL_STEPS: u32 = 25;
 /// Stretch of the route before and behind the ego vehicle on which others meet it, m.
 const LEVEL_REACH_M: f64 = 200.0;
 
-/// A road user is searched for along the route within [`WINDING`] times its straight distance plus [`BESIDE_M`]: in bends the
-/// route is longer than the straight way.
+/// A road user is searched for along the route within [`WINDING`] times its straight distance plus [`BESIDE_M`]. In
+/// bends the route is longer than the straight way.
 const WINDING: f64 = 2.0;
 const BESIDE_M: f64 = 50.0;
 
@@ -51,7 +51,7 @@ pub struct Around<'a> {
     /// All other road users: those before it in the world's order, and those after it.
     pub users: [&'a [RoadUser]; 2],
     pub signals: &'a SignalClock,
-    /// What each signal shows now.
+    /// The colour of each signal now.
     pub colours: &'a [SignalColour],
     pub tick: u64,
     /// Friction under the ego vehicle.
@@ -65,7 +65,7 @@ pub struct Around<'a> {
     pub reactions: u64,
 }
 
-/// What a driver has to know of another road user, or of the ego vehicle, so as not to run into it.
+/// The facts that a driver needs about another road user, or the ego vehicle, so as not to run into it.
 #[derive(Clone, Copy)]
 pub struct Other<'a> {
     pub outline: &'a OrientedBox,
@@ -83,7 +83,7 @@ impl<'a> From<&'a Obstacle> for Other<'a> {
     }
 }
 
-/// What a road user decides by: itself as others see it, its body, and the world around it.
+/// The basis of a road user's decisions: itself as others see it, its body, and the world around it.
 pub struct View<'a> {
     pub this: &'a Obstacle,
     pub size: &'a BodyParameters,

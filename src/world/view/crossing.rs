@@ -6,8 +6,8 @@ use crate::view::around::Around;
 use avastra_road::LaneIndex;
 
 impl Driver {
-    /// From its front to where its way next crosses the ego vehicle's route, and from the ego vehicle's front to there, m;
-    /// below 0 if that one is past it.
+    /// From its front to where its way next crosses the ego vehicle's route, and from the ego vehicle's front to there,
+    /// m. The second is below 0 if the ego vehicle is past it.
     pub fn ways_to_crossing(&self, length_m: f64, around: &Around) -> Option<(f64, f64)> {
         self.next_crossing(length_m, around, None).map(|(_, ways)| ways)
     }

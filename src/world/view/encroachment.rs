@@ -22,7 +22,7 @@ pub struct Encroachment {
 type Trail = VecDeque<OrientedBox>;
 
 impl Encroachment {
-    /// Notes where everybody is. To be called at every tick.
+    /// Notes the places of all road users. To be called at every tick.
     pub fn note(&mut self, world: &World) {
         add(&mut self.ego, &world.ego_outline());
         self.others.retain(|(id, _)| world.obstacle(*id).is_some());
@@ -36,8 +36,8 @@ impl Encroachment {
         }
     }
 
-    /// Since the other one of the ego vehicle and this road user left the place where one of them is now, s;
-    /// [`TIME_S_MAX`] if it was not there lately.
+    /// Time since the ego vehicle or this road user left the place where the other one is now, s; [`TIME_S_MAX`] if
+    /// neither was there lately.
     pub fn pet_s(&self, id: u32) -> f64 {
         let trail = self.others.iter().find(|(known, _)| *known == id).map(|(_, trail)| trail);
         let Some(((ego, other), trail)) =
@@ -92,8 +92,8 @@ mod tests {
     fn who_crosses_behind_another_is_there_later_by_so_much() {
         for later_s in [1.0, 2.0, 3.5] {
             let least_s = crossing(later_s).into_iter().fold(TIME_S_MAX, f64::min);
-            // The first one's rear leaves the strip of the second one 0.3 s after its middle passed, whose front enters 0.3 s before
-            // its own middle.
+            // The first one's rear leaves the second one's strip 0.3 s after its middle passed. The second one's front
+            // enters 0.3 s before its own middle.
             let wanted_s = later_s - 0.6;
             assert!((least_s - wanted_s).abs() <= 1.01 * DT_S, "{least_s} s in place of {wanted_s} s");
         }

@@ -1,5 +1,5 @@
-//! What can be asked about a moment: the facts of the ego vehicle and its surroundings, and those of another road
-//! user. Rules, policies and the paper's state variables read the same ones.
+//! Questions about a moment: the facts of the ego vehicle and its surroundings, and those of another road user. Rules,
+//! policies and the paper's state variables read the same ones.
 
 use avastra_base::geometry::Vec2;
 use avastra_lang::model::vocabulary::{Light, Part, Parts, Priority, Turn};
@@ -33,7 +33,7 @@ impl World {
     }
 
     /// Time until the next traffic light on the route changes its colour, s, in steps of half a second and at most
-    /// `most_s`; `None` without a light within reach.
+    /// `most_s`. `None` without a light within reach.
     pub fn light_changes_in_s(&self, most_s: f64) -> Option<f64> {
         const STEP_S: f64 = 0.5;
         let around = self.alone();
@@ -130,7 +130,7 @@ impl Around<'_> {
         lanes[first..].iter().find_map(|lane| self.scene.map.lane(lane.lane).junction)
     }
 
-    /// What the ego vehicle's place says.
+    /// The facts that follow from the ego vehicle's station.
     fn on_route(&self) -> OnRoute {
         OnRoute::at(&self.scene.map, &self.scene.route, self.ego_station_m)
     }
@@ -143,7 +143,7 @@ impl Around<'_> {
         })
     }
 
-    /// What a traffic light shows; `None` without one.
+    /// The colour of a traffic light; `None` without one.
     fn light(&self, signal: Option<usize>) -> Light {
         match signal.map(|signal| self.colours[signal]) {
             None => Light::None,
@@ -301,7 +301,7 @@ fn facts(
     }
 }
 
-/// Where another stretch lies beside that of the ego vehicle in one direction: they overlap while one of its ends is below 0
+/// Where another stretch lies beside the ego vehicle's in one direction. They overlap while one of its ends is below 0
 /// and the other above it.
 #[derive(Debug, Clone, Copy)]
 struct Closing {
@@ -581,7 +581,7 @@ mod tests {
         assert!(bound > 0 && free > bound && wrong > 0, "{bound} of {free}, {wrong}");
     }
 
-    /// What was known of a driver when its first lane change began, within 20 s.
+    /// The facts of a driver when its first lane change began, within 20 s.
     fn first_change(world: &mut World, id: u32) -> Option<NpcFacts> {
         for _ in 0..1000 {
             let before = world.npc_facts(id)?;

@@ -1,14 +1,14 @@
 //! How much room a newcomer leaves to a careful and competent driver.
 //!
-//! The driver of UN R157 (Annex 4, Appendix 3) perceives the risk for 0.4 s, reacts after 0.75 s
-//! more, and brakes with a jerk of 12.65 m/s³ up to 0.774 g, or what the road gives. With Δv the
-//! speed to be lost against the other, the gap closes by
+//! The driver of UN R157 (Annex 4, Appendix 3) perceives the risk for 0.4 s and reacts after 0.75 s more. It brakes
+//! with a jerk of 12.65 m/s³ up to 0.774 g, or what the road gives. With Δv the speed to be lost against the other, the
+//! gap closes by
 //!
 //! Δv (0.4 + 0.75) + way while the brake builds up + (Δv left)² / 2a.
 //!
-//! Left out is the deceleration of 0.4 m/s² by the released accelerator, which esmini's and the JRC's
-//! versions of the driver have before the brake; the regulation's table has none. The regulation knows
-//! only leaders; [`oncoming_m`] and [`from_behind_m`] are ours.
+//! The deceleration of 0.4 m/s² by the released accelerator is left out. esmini's and the JRC's versions of the driver
+//! have it before the brake; the regulation's table has none. The regulation knows only leaders; [`oncoming_m`] and
+//! [`from_behind_m`] are ours.
 
 use avastra_base::kinematics::{
     CAREFUL_BRAKING_MPS2 as BRAKING_MPS2, CAREFUL_DELAY_S as DELAY_S, CAREFUL_JERK_MPS3 as JERK_MPS3,
@@ -88,7 +88,7 @@ mod tests {
     fn an_oncoming_one_needs_room_for_both() {
         // At rest the driver still perceives and reacts, and the other comes on meanwhile.
         assert!((oncoming_m(0.0, 10.0, 0.85) - 11.5).abs() < 1e-9);
-        // 32.7 m of its own, and 1.15 + 0.6 + 1.53 s of the other's way.
+        // 32.7 m of the ego vehicle's way, and 1.15 + 0.6 + 1.53 s of the other's.
         assert!((oncoming_m(50.0 / 3.6, 10.0, 0.85) - (32.7 + 32.8)).abs() < 0.2);
     }
 }

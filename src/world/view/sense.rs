@@ -1,8 +1,8 @@
-//! What reaches the ego vehicle's sensors: the truth, cut down to what is in range. Hidden objects are
-//! not left out: each object says how much of it is in sight.
+//! The input of the ego vehicle's sensors: the truth, cut down to their range. Hidden objects are not left out: each
+//! object says how much of it is in sight.
 //!
-//! This is the physical side of sensing (line of sight, light, weather). What a driving system makes
-//! of it, with its errors and delays, is `ads`.
+//! This is the physical side of sensing (line of sight, light, weather). The module `ads` makes from it the view of a
+//! driving system, with its errors and delays.
 
 use avastra_base::geometry::{Frame, OrientedBox, Vec2, larger};
 
@@ -27,7 +27,7 @@ pub fn visible_fraction<'a>(
         return 1.0;
     }
     let radius_m = target.outline.radius_m();
-    // Most often nobody stands in the way.
+    // Most often no road user stands in the way.
     let hides = |other: &&Obstacle| {
         other.id != target.id && may_hide(eye, towards, distance_m, radius_m, &other.outline)
     };

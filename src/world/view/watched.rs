@@ -1,5 +1,5 @@
-//! What requirements may ask beside the moment: what must be watched from tick to tick, and what costs too much to be
-//! looked up where nobody asks.
+//! Facts for requirements beside the moment. Some must be watched from tick to tick, and some cost too much to be
+//! looked up where no requirement needs them.
 
 use std::collections::VecDeque;
 
@@ -17,8 +17,8 @@ use crate::state::time::{DT_S, FRAME_TICKS};
 use crate::state::world::World;
 use crate::view::around::Around;
 
-/// Whoever is in the ego vehicle's way is nearer to a point than this and half of both outlines, m: half a step, half the
-/// width of the ego vehicle on any heading, and what a bend adds.
+/// A road user in the ego vehicle's way is nearer to a point than this and half of both outlines, m. It is half a step,
+/// half the width of the ego vehicle on any heading, and what a bend adds.
 const WAY_ASIDE_M: f64 = 9.0;
 /// Ticks of a second.
 const TICKS_PER_S: usize = (1.0 / DT_S) as usize;
@@ -86,7 +86,7 @@ impl Watched {
         facts
     }
 
-    /// The road user ahead. Somebody new is looked for ten times a second, as drivers look around.
+    /// The road user ahead. A new one is looked for ten times a second, as drivers look around.
     fn lead(&mut self, world: &World, around: &Around) -> Option<Lead> {
         let known = self.lead.filter(|_| !world.ticks().is_multiple_of(FRAME_TICKS));
         let still = known.and_then(|(id, _, station_m)| {
@@ -200,7 +200,7 @@ fn next_ahead(around: &Around) -> Option<Lead> {
         around.scene.points_ahead(around.ego_station_m);
     let ahead = around.obstacles_on_level().filter_map(|obstacle| {
         let outline = &obstacle.outline;
-        // Whoever is in the way is no farther from one of the points.
+        // A road user in the way is no farther from one of the points.
         let reach_m = outline.half_length_m + outline.half_width_m + around.ego_offset_m.abs() + WAY_ASIDE_M;
         let place = outline.pose.position;
         let is_within =
@@ -247,8 +247,8 @@ fn ego_half_width_m(around: &Around, along: Vec2) -> f64 {
     around.ego_outline.half_extent_m(around.ego_forward, along).1
 }
 
-/// How far the ego vehicle's front is beyond the beginning of the first of these stretches of the route whose end its rear has not
-/// passed, m; below 0 the way to it.
+/// How far the ego vehicle's front is beyond the beginning of the first of these stretches of the route whose end its
+/// rear has not passed, m. Below 0 it is the way to it.
 fn over_m(around: &Around, stretches: impl Iterator<Item = (f64, f64)>) -> f64 {
     let ego = VehicleParameters::MKZ;
     let (front_m, rear_m) = (ego.front_m(around.ego_station_m), ego.rear_m(around.ego_station_m));
@@ -256,18 +256,18 @@ fn over_m(around: &Around, stretches: impl Iterator<Item = (f64, f64)>) -> f64 {
     next.map_or(FAR_M, |(begin_m, _)| (front_m - begin_m).max(FAR_M))
 }
 
-/// Of the lines of stop signs.
+/// As `over_m`, for the lines of stop signs.
 fn over_stop_m(around: &Around) -> f64 {
     let lines = around.scene.route.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
     over_m(around, lines.map(|line| (line.station_m, line.station_m)))
 }
 
-/// Of the stop lines of lights.
+/// As `over_m`, for the stop lines of lights.
 fn over_line_m(around: &Around) -> f64 {
     over_m(around, around.scene.route.stop_lines.iter().map(|line| (line.station_m, line.station_m)))
 }
 
-/// Of crosswalks, from edge to edge.
+/// As `over_m`, for crosswalks, from edge to edge.
 fn over_crosswalk_m(around: &Around) -> f64 {
     over_m(around, around.scene.route.crosswalks_m.iter().copied())
 }

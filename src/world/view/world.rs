@@ -1,4 +1,4 @@
-//! What can be asked about a world, or about the world around one road user.
+//! Facts about a world, or about the world around one road user.
 
 use avastra_base::geometry::Pose;
 use avastra_lang::model::NpcFacts;
@@ -12,7 +12,7 @@ use crate::state::sensed::{Sensed, SensedObject};
 use crate::state::world::World;
 use crate::view::moment::npc_facts;
 
-/// What stands farther ahead than this on the route does not block the ego vehicle, m: a queue of five cars.
+/// An obstacle farther ahead than this on the route does not block the ego vehicle, m: a queue of five cars.
 const QUEUE_M: f64 = 40.0;
 
 /// An ego vehicle farther than this from its way and from every lane of the map has left the map, m. One that went astray beside
@@ -20,7 +20,7 @@ const QUEUE_M: f64 = 40.0;
 const OFF_MAP_M: f64 = 20.0;
 
 impl World {
-    /// What can be asked about the road user with an id, if it is there.
+    /// Facts about the road user with an id, if it is there.
     pub fn npc_facts(&self, id: u32) -> Option<NpcFacts> {
         let user = self.user(id)?;
         let facts = npc_facts(&self.alone(), &user.obstacle, &user.mover.motion);
@@ -28,12 +28,12 @@ impl World {
         Some(NpcFacts { priority, crashed, ..facts })
     }
 
-    /// What can be asked about the latest bearer of a name, if one is there.
+    /// Facts about the latest bearer of a name, if one is there.
     pub fn bearer_facts(&self, who: usize) -> Option<NpcFacts> {
         self.npc_facts(self.users[self.bearer(who)?].obstacle.id)
     }
 
-    /// What the sensors see now, in buffers of its own.
+    /// The sensors' output now, in newly allocated buffers.
     pub fn sensed(&self) -> Sensed {
         let mut sensed = Sensed {
             time_s: 0.0,
@@ -112,7 +112,7 @@ impl World {
         !self.ego.motion.touched && self.ego_offset_m.abs() > half_m && !route.changes.iter().any(changes)
     }
 
-    /// Whether the ego vehicle has driven off the map: its front bumper is beyond the end of its way (the end of the
+    /// Whether the ego vehicle has driven off the map. Its front bumper is beyond the end of its way (the end of the
     /// lanes, or 60 m past the goal), or no lane is near it. Nothing can happen there, because road users appear beside
     /// the way.
     pub fn left_the_map(&self) -> bool {

@@ -20,7 +20,7 @@ pub fn sees_empty(place: Vec2, sensed: &Sensed, localized: &Pose) -> bool {
     if distance_m < CELL_M {
         return true;
     }
-    // What stands in a part of a cell takes all of it.
+    // An object in a part of a cell takes all of it.
     let ends_at =
         |outline: OrientedBox| Frame::of(&outline).ray_hit_m(eye, way / distance_m, distance_m).is_some();
     !sensed.objects.iter().any(|object| {

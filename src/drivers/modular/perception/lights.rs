@@ -1,10 +1,9 @@
 //! The colours of traffic lights, as far as they can be read.
 //!
-//! A light is read within the camera's range and the meteorological optical range, where no tall
-//! vehicle stands in the line of sight from the roof to the lamp; what was read holds for a while
-//! after it goes out of sight. A colour that is read is right: the facts at hand give no rate of
-//! confusion. Backlight is left out because the world has no azimuth of the sun; darkness costs nothing
-//! because lamps shine.
+//! A light is read within the camera's range and the meteorological optical range, where no tall vehicle
+//! stands in the line of sight from the roof to the lamp. The colour holds for a while after the light goes
+//! out of sight. A colour that is read is right: the facts at hand give no rate of confusion. Backlight is
+//! left out because the world has no azimuth of the sun; darkness costs nothing because lamps shine.
 
 use std::sync::Arc;
 
@@ -26,7 +25,7 @@ pub struct LightReader {
     scene: Arc<Scene>,
     /// For each stop line of the route: the colour last read and how long ago, s.
     read: Vec<(SignalColour, f64)>,
-    /// What is known now, by stop line; `None` is not known.
+    /// The colours known now, by stop line; `None` is not known.
     known: Vec<Option<SignalColour>>,
 }
 
@@ -82,7 +81,7 @@ mod tests {
     use avastra_lang::model::vocabulary::Body;
     use avastra_world::sim::Conditions;
 
-    /// What is known of the corner's first light from `before_m` before its line.
+    /// The known colour of the corner's first light from `before_m` before its line.
     fn read(
         reader: &mut LightReader,
         before_m: f64,

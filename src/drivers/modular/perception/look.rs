@@ -1,12 +1,11 @@
 //! A look around: which objects are detected in a frame (10 Hz), and how well.
 //!
-//! LiDAR and camera detect an object together with a chance that falls with distance and with what
-//! hides it; far away by day the camera alone does. Near by, returns are plenty and misses rare. Misses come in
-//! runs, not one by one: a chain of two states in which the share of misses is one minus that chance. Each object
-//! has a random stream of
-//! its own, so that a change of one object does not change the luck of the others.
-//! A large vehicle is at times taken for its near part alone, and for runs of frames for two vehicles.
-//! Left out: confusion of classes beside that, and headings turned round.
+//! LiDAR and camera detect an object together with a chance that falls with distance and with what hides it; far
+//! away by day the camera alone does. Near by, returns are plenty and misses rare. Misses come in runs, not one
+//! by one: a chain of two states in which the share of misses is one minus that chance. Each object has a
+//! separate random stream, so that a change of one object does not change the luck of the others. A large vehicle
+//! is at times taken for its near part alone, and for runs of frames for two vehicles. Left out: confusion of
+//! classes beside that, and headings turned round.
 
 use avastra_base::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 use avastra_base::rng;
@@ -174,8 +173,8 @@ impl Watched {
     }
 }
 
-/// A large vehicle detected as two: the near part that was measured, which a tracker knows by its near
-/// end, and the rest as an object of its own.
+/// A large vehicle detected as two: the near part that was measured, which a tracker knows by its near end,
+/// and the rest as a separate object.
 fn parts(object: &SensedObject, near: &Detection) -> [Detection; 2] {
     let rest_m = (object.length_m - near.length_m).max(1.0);
     let towards = if near.shift_m < 0.0 { -1.0 } else { 1.0 };
@@ -276,7 +275,7 @@ mod tests {
             count(&config, true, at(Body::Pedestrian, 50.0))
                 < count(&config, false, at(Body::Pedestrian, 50.0))
         );
-        // What nothing of is in sight is never seen, weakness or not.
+        // An object of which nothing is in sight is never seen, weakness or not.
         let gone = SensedObject { visible_fraction: 0.0, ..at(Body::Sedan, 20.0) };
         assert_eq!(count(&config, false, gone), 0);
     }

@@ -36,11 +36,11 @@ pub struct Claim {
     pub last: usize,
     /// Whether it must let the ego vehicle go first where they meet.
     pub owes_way: bool,
-    /// What is decided about it.
+    /// The decision about it.
     pub stance: Stance,
 }
 
-/// What a road user does on the way of the ego vehicle.
+/// The action of a road user on the way of the ego vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// Stands on it.
@@ -53,7 +53,7 @@ pub enum Role {
     Crosses,
 }
 
-/// What a plan does about a claim.
+/// The response of a plan to a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Stance {
     /// Nothing is to be decided: it counts as its role demands, or only in the cost.
@@ -102,7 +102,7 @@ impl Claim {
                 |(_, span): &(Beside, Span)| span.from_m < ahead.end && span.to_m > ahead.start - BEHIND_M;
             match taken {
                 Some((beside, span)) if near(&(beside, span)) => claim.take(step, span, forward, &beside),
-                // What is on the way far behind follows: it keeps its distance itself.
+                // A road user on the way far behind follows: it keeps its distance itself.
                 Some((_, span)) if step == 0 && span.to_m <= ahead.start - BEHIND_M => return None,
                 // Only the first stay on the way counts: what lies beyond is seen in a later cycle.
                 _ if claim.first != usize::MAX => break,
@@ -166,7 +166,7 @@ impl Claim {
         self.moving && (self.cosine > ALONG_COSINE || stays)
     }
 
-    /// What it does on the way; slower than `static_mps` it stands.
+    /// The road user's action on the way; slower than `static_mps` it stands.
     pub fn role(&self, static_mps: f64) -> Role {
         match self.goes_along() {
             _ if self.is_now() && (!self.moving || self.speed_mps < static_mps) => Role::Stands,

@@ -1,9 +1,9 @@
 //! Decisions about road users that come onto the way or cross it: ranked by cost, and remembered.
 //!
-//! The cheapest profile through the station-time graph says for each of them whether the vehicle passes
-//! before (OVERTAKE) or stays behind (YIELD, or FOLLOW if it goes along the way). A decision once taken is left
-//! only when the profile without it is cheaper by a margin, or when its object is gone: Apollo keeps decisions
-//! from cycle to cycle in the same spirit (`PATH_REUSE`, the sides of its speed bounds), the margin is ours.
+//! The cheapest profile through the station-time graph says for each of them whether the vehicle passes before
+//! (OVERTAKE) or stays behind (YIELD, or FOLLOW if it goes along the way). A decision once taken is left only
+//! when the profile without it is cheaper by a margin, or when its object is gone. Apollo keeps decisions from
+//! cycle to cycle in the same spirit (`PATH_REUSE`, the sides of its speed bounds). The margin is ours.
 
 use avastra_world::sim::VehicleParameters;
 
@@ -13,7 +13,7 @@ use super::st_graph::{Profile, Region, Situation};
 
 #[derive(Debug, Clone, Default)]
 pub struct Decisions {
-    /// What is done about each object.
+    /// The stance on each object.
     taken: Vec<(u32, Stance)>,
     /// Buffer of a cycle: the regions of all claims.
     regions: Vec<Region>,
@@ -101,7 +101,7 @@ mod tests {
     use crate::modular::planning::trajectory::Point;
     use crate::testing::straight;
 
-    /// What is decided at 10 m/s, cycle after cycle, about a car that will be on the way 8 m ahead between two
+    /// The decisions at 10 m/s, cycle after cycle, about a car that will be on the way 8 m ahead between two
     /// moments. Without a margin each cycle decides anew.
     fn decided(margin: Option<f64>, moments: &[(f64, f64)]) -> Vec<Stance> {
         let usual = PlanningConfig::default();

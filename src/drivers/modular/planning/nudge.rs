@@ -36,8 +36,8 @@ pub struct LateralPlan {
     bump: Option<Bump>,
     /// All that is passed, the first of them first.
     row: Vec<u32>,
-    /// What of it reaches into the shifted way now, because it has moved or was not where it seemed: the vehicle
-    /// stops for it.
+    /// Objects that reach into the shifted way now, because they moved or were not where they seemed: the
+    /// vehicle stops for them.
     met: Vec<u32>,
     way_back: Option<WayBack>,
 }
@@ -72,7 +72,7 @@ impl WayBack {
 #[derive(Debug, Clone, Copy)]
 struct Bump {
     id: u32,
-    /// What is passed, along the guide.
+    /// The stretch of the guide that the passed objects take.
     span: Span,
     offset_m: f64,
     /// Stations of the rear axle at which the shift begins and is complete, and at which it begins to
@@ -152,7 +152,7 @@ impl LateralPlan {
         self.bump.is_some() && self.row.contains(&id) && !self.met.contains(&id)
     }
 
-    /// What is being passed, and where it stands.
+    /// The object that is being passed, and where it stands.
     pub fn passing(&self) -> Option<(u32, Span)> {
         self.bump.filter(|bump| !self.met.contains(&bump.id)).map(|bump| (bump.id, bump.span))
     }
@@ -233,7 +233,7 @@ impl Bump {
     }
 }
 
-/// What stands ahead, as the vehicle at a station knows it.
+/// The standing objects ahead, as the vehicle at a station knows them.
 struct Standing<'a> {
     config: &'a PlanningConfig,
     guide: &'a Guide,
@@ -249,7 +249,7 @@ impl Standing<'_> {
         VehicleParameters::MKZ.front_m(self.station_m)
     }
 
-    /// What stands on the way or near it.
+    /// The objects that stand on the way or near it.
     fn edges(&self) -> impl Iterator<Item = Edge> {
         self.forecasts.iter().filter(|forecast| !forecast.moving).filter_map(|forecast| {
             let (station_m, position) = (self.station_m, forecast.positions[0]);

@@ -63,7 +63,7 @@ pub struct Planner {
     decisions: Decisions,
 }
 
-/// What a cycle plans from.
+/// The inputs of a planning cycle.
 #[derive(Debug)]
 pub struct Outlook<'a> {
     /// Where the vehicle believes it is.
@@ -73,7 +73,7 @@ pub struct Outlook<'a> {
     /// Age of the last plan, s.
     pub since_s: f64,
     pub forecasts: &'a [Forecast],
-    /// What is known of the light of each stop line of the route.
+    /// The known colour of the light at each stop line of the route.
     pub lights: &'a [Option<SignalColour>],
     /// Weather and light, which the vehicle measures itself.
     pub conditions: &'a Conditions,
@@ -254,7 +254,8 @@ impl Planner {
     }
 
     /// The last check of a plan: whatever was decided, it brakes as hard as it must, up to the emergency limit,
-    /// if it would touch anything that binds; if that is of no use, it takes what keeps clear for longest.
+    /// if it would touch anything that binds. If that is of no use, it takes the plan that keeps clear for
+    /// longest.
     fn check(&mut self, start: Point) {
         let planned = self.constraints.len();
         for _ in 0..ROUNDS {
@@ -283,8 +284,8 @@ impl Planner {
         self.trajectory = Trajectory::braking(start, decel_mps2, braking_reason);
     }
 
-    /// The first contact with what binds: index of the claim, time (s) and station (m). What the vehicle touches
-    /// or is beside of already does not count: no plan can keep clear of it.
+    /// The first contact with what binds: index of the claim, time (s) and station (m). An object that the
+    /// vehicle touches or is beside already does not count: no plan can keep clear of it.
     fn first_contact(&self, start: &Point) -> Option<(usize, f64, f64)> {
         let vehicle = VehicleParameters::MKZ;
         let (rear_m, front_m) = (vehicle.rear_m(start.station_m), vehicle.front_m(start.station_m));

@@ -1,9 +1,10 @@
-//! Who must let the ego vehicle go first, where other lanes meet its route in junctions.
+//! The lanes whose vehicles must let the ego vehicle go first, where they meet its route in junctions.
 //!
 //! From the map alone: lights that are never green together, signs, and the order of the lanes
 //! (`sim::right_of_way`). It is asked only about futures that an object may have: one that would break the ego
-//! vehicle's right of way binds the plan only if it is the more probable one. What is probable binds whoever
-//! has priority: a driving system that insists on its right is no better than one that forgets it.
+//! vehicle's right of way binds the plan only if it is the more probable one. A probable future binds a
+//! vehicle that has priority, too: a driving system that insists on its right is no better than one that
+//! forgets it.
 
 use avastra_lang::model::vocabulary::Priority;
 use avastra_road::LaneIndex;

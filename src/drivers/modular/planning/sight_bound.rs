@@ -11,8 +11,8 @@
 //! behind a vehicle that hides the lane. Before the place at which it can no longer stop short of that lane, the ego
 //! vehicle may be only so fast that it could yield to such a vehicle, or would be gone before it. Where no speed is
 //! slow enough, as in thick fog, it creeps to the edge of that lane, from where it sees farthest, and can stop until
-//! then. That hidden road users must be reckoned with is rule 4 of RSS (Shalev-Shwartz et al. 2017: be cautious where
-//! the view is limited), and their greatest speed an assumption that IEEE 2846 asks for; that it is the limit is ours.
+//! then. To reckon with hidden road users is rule 4 of RSS (Shalev-Shwartz et al. 2017): be cautious where the view is
+//! limited. IEEE 2846 asks for an assumption about their greatest speed. That it is the speed limit is ours.
 //!
 //! Left out: crests, as the maps are flat, and what buildings hide, as the maps have none.
 
@@ -56,15 +56,15 @@ pub struct SightBound {
     /// Crosswalks, from and to, m.
     crosswalks_m: Vec<(f64, f64)>,
     prior: Vec<PriorLane>,
-    /// What the planner is told of its sensors, not what a planted fault makes of them.
+    /// The sensors as the planner is told of them, without planted faults.
     sensors: PerceptionConfig,
-    /// Nobody goes on foot on a motorway (Vienna Convention on Road Traffic, article 25).
+    /// Pedestrians are banned from motorways (Vienna Convention on Road Traffic, article 25).
     is_motorway: bool,
     /// The conditions that the ranges were worked out for, and these.
     known: Option<(Conditions, Seen)>,
 }
 
-/// What the sensors surely see.
+/// The sure range of the sensors, and the speed that it allows.
 #[derive(Debug, Clone, Copy)]
 struct Seen {
     /// The speed that this allows, m/s.
@@ -171,7 +171,7 @@ impl PriorLane {
         let mut upstream = Vec::new();
         for _ in 0..=(ALONG_M / STEP_M) as usize {
             while at_m < 0.0 {
-                // Of several lanes that lead to it, the first will do.
+                // If several lanes lead to it, the first will do.
                 let Some(&before) = map.lane(lane).predecessors.first() else { break };
                 lane = before;
                 at_m += map.lane(lane).centre.length_m();

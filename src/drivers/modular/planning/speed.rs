@@ -41,7 +41,7 @@ enum Kind {
     Leader(usize),
 }
 
-/// What a constraint allows at a moment.
+/// The acceleration that a constraint allows at a moment.
 #[derive(Debug, Clone, Copy)]
 struct Bound {
     acceleration_mps2: f64,
@@ -53,7 +53,7 @@ impl Bound {
         Bound { acceleration_mps2, emergency: false }
     }
 
-    /// What is planned, or the braking that is needed (magnitude), where that is an emergency.
+    /// The planned acceleration, or the needed braking (magnitude) where that is an emergency.
     fn of(config: &PlanningConfig, planned_mps2: f64, needed_mps2: f64) -> Bound {
         if needed_mps2 > config.deceleration_mps2_max {
             Bound { acceleration_mps2: smaller(planned_mps2, -needed_mps2), emergency: true }
@@ -147,8 +147,8 @@ impl Constraint {
     }
 }
 
-/// What a leader allows. One that has yet to come onto the way is fallen back behind at the comfortable rate
-/// at most: there is time until it is there.
+/// The bound that a leader sets. Behind a leader that has yet to come onto the way, the vehicle falls back at
+/// the comfortable rate at most: there is time until it is there.
 fn leader_bound(
     config: &PlanningConfig,
     claim: &Claim,

@@ -1,13 +1,13 @@
 //! The station-time graph: a dynamic programme that ranks the ways past all road users by cost.
 //!
 //! Apollo's speed heuristic (`GriddedPathTimeGraph`): columns of 1 s, rows of stations, the cheapest way from
-//! the vehicle's place to the last column under limits of speed and acceleration. The profile that comes out
-//! is not driven; it is compared with every region, and says what is decided about each road user: below a
-//! region the vehicle stays behind, above it passes before. The law in `speed` then drives the decisions.
+//! the vehicle's place to the last column under limits of speed and acceleration. The resulting profile is
+//! not driven. It is compared with every region, and gives the decision about each road user: below a region
+//! the vehicle stays behind, above it passes before. The law in `speed` then drives the decisions.
 //!
-//! Ours: rows of 2 m (Apollo: 0.1 to 1 m), because decisions alone are read off; the costs near the limits of
-//! acceleration, which four possible accelerations do not need; and hypotheses that are too improbable to
-//! bind count in the cost, weighted with their probability.
+//! Ours: rows of 2 m (Apollo: 0.1 to 1 m), because decisions alone are read off. Ours, too: the costs near
+//! the limits of acceleration, which four possible accelerations do not need. Hypotheses that are too
+//! improbable to bind count in the cost, weighted with their probability.
 
 use crate::kit::Guide;
 use avastra_base::geometry::{larger, smaller};
@@ -42,7 +42,7 @@ const LEFT_PENALTY: f64 = 1e2;
 /// inside one finds the best way out. Ours.
 const INSIDE_COST: f64 = 1e9;
 
-/// What a cycle's decisions are taken from.
+/// The inputs of a cycle's decisions.
 pub struct Situation<'a> {
     pub config: &'a PlanningConfig,
     pub guide: &'a Guide,
@@ -53,7 +53,7 @@ pub struct Situation<'a> {
     pub hysteresis: bool,
 }
 
-/// What the graph knows of a claim: where the front bumper must not be, m ahead of where it is now.
+/// A claim in the graph: where the front bumper must not be, m ahead of where it is now.
 #[derive(Debug, Clone, Copy)]
 pub struct Region {
     /// Index in the claims.
@@ -189,7 +189,7 @@ struct Place {
     limit_mps: f64,
 }
 
-/// What a search through the graph goes by.
+/// The inputs of a search through the graph.
 struct Search<'a> {
     config: &'a PlanningConfig,
     guide: &'a Guide,

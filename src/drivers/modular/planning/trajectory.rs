@@ -52,7 +52,7 @@ impl Trajectory {
     /// When this plan first comes into the part of the way that a claim takes: s from now, and the station
     /// of the claim's near end then. The plan is widened by `buffer_s` to both sides in time.
     ///
-    /// What comes onto the way behind the vehicle and drives along it keeps its distance itself.
+    /// A road user that comes onto the way behind the vehicle and drives along it keeps its distance itself.
     pub fn meets(&self, claim: &Claim, buffer_s: f64) -> Option<(f64, f64)> {
         let vehicle = VehicleParameters::MKZ;
         let rear_m = vehicle.rear_m(self.at((claim.entry_s() - buffer_s).max(0.0)).station_m);

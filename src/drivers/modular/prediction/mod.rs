@@ -1,13 +1,13 @@
 //! Where the tracked objects will be: 8 s ahead, every 0.5 s, in up to three ways each.
 //!
 //! A vehicle follows its lane. At a fork it has one hypothesis for each successor, and while it drifts one
-//! that keeps the lane and one that leaves it; their probabilities come from noisy tracks and may be wrong.
+//! that keeps the lane and one that leaves it. Their probabilities come from noisy tracks and may be wrong.
 //! It is believed to leave its lane only once its centre is over the edge or its lateral speed has lasted
 //! half a second: a documented weakness of the system modelled (Apollo issues 11118, 12798, 14212), kept on
-//! purpose and switchable. Along each lane it follows its leader, slows down for bends and stops at
-//! lights that are known to be red. Pedestrians at the kerb may set out. What is far away or on no lane keeps
-//! its velocity. Left out: indicators, reactions to the ego vehicle, and Apollo's learned predictors, which
-//! have in common with this that they follow lanes.
+//! purpose and switchable. Along each lane it follows its leader, slows down for bends and stops at lights
+//! that are known to be red. Pedestrians at the kerb may set out. An object that is far away or on no lane
+//! keeps its velocity. Left out: indicators, reactions to the ego vehicle, and Apollo's learned predictors,
+//! which have in common with this that they follow lanes.
 
 mod course;
 mod profile;
@@ -87,7 +87,7 @@ pub struct Forecast {
     pub positions: [Vec2; STEPS + 1],
 }
 
-/// What prediction remembers of an object from frame to frame.
+/// The memory of an object from frame to frame.
 #[derive(Debug, Clone, Default)]
 struct Memory {
     id: u32,
@@ -247,7 +247,7 @@ impl Prediction {
     }
 }
 
-/// What the future of a vehicle depends on beside itself.
+/// The inputs that the future of a vehicle depends on beside itself.
 struct Road<'a> {
     config: &'a PredictionConfig,
     map: &'a RoadMap,
@@ -396,7 +396,7 @@ fn aligned(config: &PredictionConfig, map: &RoadMap, place: LanePlace, heading_r
     wrap_angle(heading_rad - lane_rad).abs() <= config.off_lane_rad
 }
 
-/// What the default settings predict at once of these tracks, for an ego vehicle at a place.
+/// The forecasts of these tracks at once with the default settings, for an ego vehicle at a place.
 #[cfg(test)]
 pub fn forecasts_of(scene: &Arc<Scene>, tracks: &[Track], ego: Vec2) -> Vec<Forecast> {
     let mut prediction = Prediction::new(&PredictionConfig::default(), true, scene, None);

@@ -1,8 +1,8 @@
 //! How fast a vehicle goes along its course.
 //!
 //! It keeps its speed, and for a while its acceleration, unless its leader, a bend or a red light makes it
-//! slower. The leader keeps its own speed. This stands for Apollo's `MOVE_SEQUENCE`, in which a lane is followed
-//! with a speed of its own.
+//! slower. The leader keeps its own speed. This stands for Apollo's `MOVE_SEQUENCE`, in which a vehicle follows
+//! its lane at its own speed.
 
 use avastra_base::geometry::{larger, smaller};
 use avastra_base::kinematics::{Following, needed_mps2};
@@ -30,7 +30,7 @@ const LEADER_M_MAX: f64 = 60.0;
 const FOLLOWING: Following =
     Following { gap_m_min: 2.0, time_gap_s: 1.5, acceleration_mps2: 1.0, comfortable_mps2: 2.0 };
 
-/// What decides about the speed.
+/// The facts that decide about the speed.
 #[derive(Debug, Clone, Copy)]
 pub struct Motion {
     pub speed_mps: f64,

@@ -1,7 +1,6 @@
-//! What pedestrians near a carriageway may do.
-//! A pedestrian who walks towards it crosses it, one who walks along it stays beside it, and one who stands at the kerb
-//! and faces it may set out, which gets less probable the longer the wait. Apollo's `SEMANTIC_LSTM` learns this from
-//! maps; the rule and its figures are ours.
+//! The possible ways of pedestrians near a carriageway. A pedestrian who walks towards it crosses it, one who walks
+//! along it stays beside it, and one who stands at the kerb and faces it may set out, which gets less probable the
+//! longer the wait. Apollo's `SEMANTIC_LSTM` learns this from maps; the rule and its figures are ours.
 
 use avastra_base::geometry::{Vec2, unit_vector};
 use avastra_road::{LanePlace, RoadMap};
@@ -28,7 +27,7 @@ const PROBABILITY_MIN: f64 = 0.05;
 const SETS_OUT_AFTER_S: f64 = 0.5;
 const WALK_MPS: f64 = 1.3;
 
-/// What is known of a pedestrian from frame to frame.
+/// The memory of a pedestrian from frame to frame.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Walker {
     /// How long it has stood, s.

@@ -2,8 +2,8 @@
 //!
 //! As Apollo's fusion: detections are associated with tracks by distance within a gate, each track is a Kalman
 //! filter, and a track is published once it has had more than three detections, in a row or not. Detections
-//! carry no identity, so tracks can swap; of two tracks in one place the younger is taken for a duplicate,
-//! so objects that touch can merge; and a large vehicle that is detected in parts splits.
+//! carry no identity, so tracks can swap. Of two tracks in one place the younger is taken for a duplicate, so
+//! objects that touch can merge. A large vehicle that is detected in parts splits.
 //!
 //! A track that is not seen any more is dropped soon. One that stands near by is held, because nothing that
 //! stands is gone by not being detected: the vehicle does not drive onto a place that was taken a moment ago
@@ -198,7 +198,7 @@ mod tests {
         }
     }
 
-    /// What is not detected was not near enough to be held, or its place was seen empty.
+    /// An undetected object was not near enough to be held, or its place was seen empty.
     fn gone(_: Vec2) -> bool {
         false
     }

@@ -1,4 +1,4 @@
-//! One track: a Kalman filter of constant velocity, the two axes alike.
+//! One track: a Kalman filter of constant velocity, the same for both axes.
 //!
 //! No turn rate is estimated; headings are smoothed.
 
@@ -40,7 +40,7 @@ pub struct Track {
     pub(super) unseen_s: f64,
 }
 
-/// Covariance of position and velocity, alike along both axes.
+/// Covariance of position and velocity, the same along both axes.
 #[derive(Debug, Clone, Copy)]
 struct Covariance {
     position: f64,

@@ -93,7 +93,7 @@ fn of_any(name: &str, entity: &str, what: Element) -> Element {
     condition(name, by_entity(entity, what))
 }
 
-/// What a condition asks of an entity.
+/// A condition about an entity.
 pub fn by_entity(entity: &str, what: Element) -> Element {
     let entities = Element::new("TriggeringEntities")
         .with("triggeringEntitiesRule", "any")
@@ -102,7 +102,7 @@ pub fn by_entity(entity: &str, what: Element) -> Element {
     Element::new("ByEntityCondition").holding(entities).holding(what)
 }
 
-/// What a condition asks of no entity.
+/// A condition about no entity.
 pub fn by_value(what: Element) -> Element {
     Element::new("ByValueCondition").holding(what)
 }

@@ -1,8 +1,8 @@
-//! What CARLA's ScenarioRunner (0.9.13 and later) wants said otherwise, and what is lost.
+//! The differences that CARLA's ScenarioRunner (0.9.13 and later) needs, and what is lost.
 //!
-//! It reads OpenSCENARIO 1.0 alone. Vehicles are models of CARLA, outlines of the file are ignored; everyone is made as the
-//! scenario begins; lights and changes of weather are not read or do not work; polylines follow their times. Its parser is
-//! public, and is where this comes from.
+//! It reads OpenSCENARIO 1.0 alone. Vehicles are models of CARLA, and outlines of the file are ignored. All entities are
+//! made as the scenario begins. Lights and changes of weather are not read or do not work. Polylines follow their times.
+//! Its parser is public, and is where this comes from.
 
 use std::collections::BTreeSet;
 
@@ -20,7 +20,7 @@ use super::style::{BENEATH_M, property};
 /// Above this it sees no fog, below nothing but fog, m.
 const FOG_M: f64 = 1000.0;
 
-/// What a file for ScenarioRunner leaves out or says only in part.
+/// The content that a file for ScenarioRunner leaves out or says only in part.
 pub fn dropped(recording: &Recording) -> Vec<String> {
     let mut dropped = vec!["exact ways and times: whoever the file moves drives by actions".to_owned()];
     let bodies: BTreeSet<&str> = recording.actors().map(|actor| model(actor).1).collect();
@@ -45,14 +45,14 @@ pub fn dropped(recording: &Recording) -> Vec<String> {
     dropped
 }
 
-/// An entry of `Entities`. What the header has no room for is with the ego vehicle.
+/// An entry of `Entities`. The ego vehicle's entry also holds the facts that the header has no room for.
 pub fn entity(recording: &Recording, actor: &Actor) -> Element {
     let object = Element::new("ScenarioObject").with("name", actor.name());
     let (model, _) = model(actor);
     let kind = if actor.id == 0 { "ego_vehicle" } else { "simulation" };
     let properties = Element::new("Properties").holding(property("type", kind));
     let Some(category) = vehicle_category(actor.body) else {
-        // Of things its player takes the name for the model.
+        // The player takes the name of an object as its model.
         let other = match actor.body {
             Body::Object => without_wheels(actor, model),
             _ => without_wheels(actor, &actor.name()).with("model", model),

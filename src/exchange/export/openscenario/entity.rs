@@ -55,7 +55,7 @@ pub fn build(actor: &Actor) -> [Element; 3] {
             .measured("positionZ", WHEEL_M / 2.0)
     };
     let axles = Element::new("Axles")
-        // Of others no largest angle is known; the ego vehicle's serves for all.
+        // The largest steering angle of other vehicles is not known; the ego vehicle's serves for all.
         .holding(axle("FrontAxle", VehicleParameters::MKZ.steer_rad_max, actor.shape.wheelbase_m))
         .holding(axle("RearAxle", 0.0, 0.0));
     [bounding_box(actor), performance, axles]
@@ -79,7 +79,7 @@ pub fn bounding_box(actor: &Actor) -> Element {
     Element::new("BoundingBox").holding(centre).holding(dimensions)
 }
 
-/// Who is on foot, or a thing, without its outline and properties.
+/// A pedestrian, an animal or an object, without its outline and properties.
 pub fn without_wheels(actor: &Actor, name: &str) -> Element {
     let element = match actor.body {
         Body::Object => Element::new("MiscObject").with("name", name).with("miscObjectCategory", "obstacle"),
@@ -91,7 +91,7 @@ pub fn without_wheels(actor: &Actor, name: &str) -> Element {
     element.measured("mass", actor.shape.mass_t * 1000.0)
 }
 
-/// `None` for who is on foot, and for things.
+/// `None` for pedestrians, animals and objects.
 pub fn vehicle_category(body: Body) -> Option<&'static str> {
     match body {
         Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback => Some("car"),

@@ -1,7 +1,7 @@
 //! On which lanes a recorded way lies: what a log of poses says of lanes, routes and lane changes.
 //!
-//! Of all ways over the lanes the one is taken that lies nearest to the poses (Viterbi's algorithm): lanes of a junction lie
-//! over each other, and which one is driven is seen only when they part.
+//! The way over the lanes that lies nearest to the poses is taken (Viterbi's algorithm). Lanes of a junction lie over
+//! each other, and only where they part is it seen which one is driven.
 
 use avastra_base::geometry::{Pose, wrap_angle};
 use avastra_road::{Lane, LaneIndex, LanePlace, RoadMap};
@@ -14,7 +14,7 @@ const REACH_M: f64 = 2.6;
 const ACROSS_RAD: f64 = 0.9;
 /// A turn of so much, rad, counts like a metre beside the centre.
 const TURN_RAD_PER_M: f64 = 0.2;
-/// What a lane change costs, in square metres: a tenth of a second in the neighbouring lane costs some twelve.
+/// The cost of a lane change, in square metres: a tenth of a second in the neighbouring lane costs some twelve.
 const CHANGE_COST: f64 = 10.0;
 /// Between two places lie at most this many ends of lanes.
 const LEAPS_MAX: usize = 4;
@@ -187,7 +187,7 @@ fn lane_change(map: &RoadMap, places: &[LanePlace], poses: &[&Pose], index: usiz
         (None, Some(late)) => late - SEEN_AFTER[1] * length,
         (None, None) => 0.0,
     };
-    // What was under way as it appeared is the rest of a change.
+    // If a change was under way as the road user appeared, only the rest of it is written.
     let begun = begin.max(0.0);
     let samples = |places: f64| (places * STRIDE as f64).round() as usize;
     let length = samples(length + begin - begun).max(1);

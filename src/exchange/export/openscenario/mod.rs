@@ -45,7 +45,7 @@ pub use style::{Ego, Others, Style, Version};
 /// A file.
 pub struct Written {
     pub text: String,
-    /// What it leaves out or says otherwise than its style promises.
+    /// The content that the file leaves out or says otherwise than its style promises.
     pub left_out: Vec<String>,
 }
 
@@ -178,7 +178,7 @@ fn begins(recording: &Recording, actor: &Actor, style: Style) -> Option<Element>
     })
 }
 
-/// What a road user does as it was recorded; nothing if the player moves it.
+/// The recorded actions of a road user; nothing if the player moves it.
 fn events(recording: &Recording, actor: &Actor, style: Style) -> Vec<Element> {
     if actor.id == 0 && style.ego != Ego::Trajectory {
         return Vec::new();

@@ -1,10 +1,10 @@
 //! Other road users as a person would write them: where they begin, how fast, when they change speed and lane, which way
 //! they take at junctions.
 //!
-//! Those who follow a trajectory from the start are written as they are told ([`as_told`]). Of others it is an
-//! approximation (`pace` and `lanes` say how near), for players whose ego vehicle drives otherwise than the recorded one: a
-//! pedestrian that set out as the ego vehicle came near does so when it comes as near, and what the ego vehicle hit stops
-//! when it is hit.
+//! Road users that follow a trajectory from the start are written as they are told ([`as_told`]). For others it is an
+//! approximation (`pace` and `lanes` say how near), for players whose ego vehicle drives otherwise than the recorded one.
+//! A pedestrian that set out as the ego vehicle came near does so when it comes as near. A road user that the ego vehicle
+//! hit stops when it is hit.
 
 use avastra_base::geometry::{Pose, Vec2};
 use avastra_campaign::episode::Actor;
@@ -24,7 +24,7 @@ use super::pace::{Change, Pace, SPEED_MPS, WAY_M};
 use super::story::{Cast, Newcomer};
 use super::style::{BENEATH_M, Version};
 
-/// What moved less than this stands, m.
+/// A road user that moved less than this stands, m.
 const STANDS_M: f64 = 0.1;
 /// A way on foot keeps this near to its vertices, m.
 const LINE_M: f64 = 0.05;
@@ -50,7 +50,7 @@ pub struct Natural<'a> {
     poses: Vec<Pose>,
     /// Where it is at first.
     place: Element,
-    /// What it does from the first on.
+    /// Its actions from the start on.
     from_the_first: Vec<Element>,
     events: Vec<Element>,
 }
@@ -79,7 +79,7 @@ fn turns_back(map: &RoadMap, way: &Driven) -> bool {
     })
 }
 
-/// What the file says of itself; `exact` are those that follow their recorded ways.
+/// The file's remark on its accuracy; `exact` are the road users that follow their recorded ways.
 pub fn caveat(exact: &[&Actor]) -> (String, String) {
     let mut text = format!(
         "an approximation that does not carry the proof of the claims: others drive by actions, with speeds \
@@ -96,8 +96,9 @@ pub fn names(actors: &[&Actor]) -> String {
     actors.iter().map(|actor| actor.name()).collect::<Vec<_>>().join(", ")
 }
 
-/// How a road user begins and what it does, as the scenario tells it, and not as it was seen: of those that appear at the start,
-/// follow a trajectory, whatever comes, and get no orders later. `None` of others, and of those who are told what no other tool knows.
+/// How a road user begins and what it does, as the scenario tells it, and not as it was seen. This is for road users that
+/// appear at the start, follow a trajectory, whatever comes, and get no orders later. `None` for others, and for orders
+/// that no other tool knows.
 pub fn as_told(recording: &Recording, actor: &Actor) -> Option<(Element, Vec<Element>)> {
     let own = recording.told.iter().position(|told| told.id == actor.id)?;
     if recording.told[own].request.verb != Verb::Follow {
@@ -116,7 +117,7 @@ pub fn as_told(recording: &Recording, actor: &Actor) -> Option<(Element, Vec<Ele
         duration_s: recording.duration_s(),
     };
     let (begins, mut events) = cast.story(own).ok()?;
-    // What it was to do after a contact it does not do.
+    // It does nothing that it was to do after a contact.
     if let Some(touch) = touch(recording, actor) {
         let touched = actor.samples[touch].tick;
         let begun = actor.phases.iter().filter(|phase| phase.tick <= touched).count();
@@ -336,7 +337,7 @@ fn is_impact(actor: &Actor, lost_mps: f64, time_s: f64) -> bool {
     lost_mps > IMPACT_TIMES * actor.shape.deceleration_mps2_max * time_s
 }
 
-/// What the ego vehicle hits stops as it did then.
+/// A road user that the ego vehicle hits stops as it did then.
 fn stop_where_hit(recording: &Recording, actor: &Actor) -> Option<Element> {
     let name = actor.name();
     let touch = touch(recording, actor)?;

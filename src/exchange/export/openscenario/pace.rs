@@ -9,7 +9,7 @@ pub const SPEED_MPS: f64 = 0.5;
 pub const WAY_M: f64 = 0.25;
 /// The longest piece, in ticks: 20 s. It bounds the search.
 const PIECE_TICKS_MAX: usize = 1000;
-/// What is slower stands, m/s.
+/// A slower road user stands, m/s.
 const REST_MPS: f64 = 0.05;
 /// Speeds are written to this, m/s.
 const ROUNDED_MPS: f64 = 0.01;
@@ -83,8 +83,8 @@ impl Way {
         })
     }
 
-    /// The end of an even change between two samples, if it keeps near the recording: with the recorded speed, or with one
-    /// that makes up for some of the way that was gained or lost.
+    /// The end of an even change between two samples, if it keeps near the recording. The change ends at the recorded
+    /// speed, or at one that makes up for some of the way that was gained or lost.
     fn piece(&self, from: usize, to: usize, written: Written) -> Option<Written> {
         let recorded_mps = self.speeds_mps[to];
         let plain = self.kept(from, to, written, rounded(recorded_mps));

@@ -1,7 +1,8 @@
-//! What a road user was told that appears at the start: where it begins, and an event for each phase of its manoeuvre.
+//! The orders of a road user that appears at the start: where it begins, and an event for each phase of its manoeuvre.
 //!
-//! Whoever drives along the lanes is placed in one and given a route; who follows another way is given that. A phase begins when the one
-//! before it is over, or, if it waits for something, when that holds while the one before it runs or after that.
+//! A road user that drives along the lanes is placed in one and given a route. A road user that follows another way is
+//! given that way. A phase begins when the one before it is over. If it waits for something, it begins when that holds
+//! while the one before it runs or after that.
 
 use core::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
@@ -33,7 +34,7 @@ const STEP_M: f64 = 0.5;
 /// The corner of a way has two vertices that are nearer than this, m.
 const BEND_M: f64 = 1e-3;
 
-/// Who is there at the start.
+/// The road users at the start.
 pub struct Cast<'a> {
     pub road: &'a Road,
     /// Station of the ego vehicle's front on its route, m.
@@ -68,17 +69,17 @@ enum Way<'a> {
 }
 
 impl<'a> Cast<'a> {
-    /// How somebody begins, and its events.
+    /// The start of a road user, and its events.
     ///
     /// # Errors
-    /// What no other player can be told, in words.
+    /// The order that no other player can be given, in words.
     pub fn story(&self, nth: usize) -> Result<(Element, Vec<Element>), String> {
         let newcomer = &self.newcomers[nth];
         let way = self.way(newcomer)?;
         Ok((self.begins(newcomer, &way), self.events(nth, &way)?))
     }
 
-    /// Whether somebody looks along the ego vehicle's route at the start.
+    /// Whether a road user looks along the ego vehicle's route at the start.
     pub fn looks_ahead(&self, actor: &Actor) -> bool {
         let pose = actor.samples[0].pose;
         let path = &self.road.route.path;
@@ -168,7 +169,7 @@ impl<'a> Cast<'a> {
             if course.is_ruled() {
                 return Err("rules say when a phase may begin".to_owned());
             }
-            // Who arrives somewhere in time may be fast on the way.
+            // A road user that must arrive somewhere in time may be fast on the way.
             let is_timed = course.phase(at).command.says(Field::Early);
             let speed_mps =
                 course.phase(at).command.expr(Field::Speed).and_then(|speed| course.constant(speed));
@@ -266,7 +267,7 @@ impl<'a> Cast<'a> {
         Ok(all)
     }
 
-    /// What a phase tells.
+    /// The actions of a phase.
     fn actions(
         &self,
         newcomer: &Newcomer,
@@ -359,7 +360,7 @@ fn is_bent(path: &Path) -> bool {
     path.points().iter().any(|point| begin.to_local(point.position).y.abs() > BEND_M)
 }
 
-/// What the event of a phase is called.
+/// The name of a phase's event.
 fn event_name(newcomer: &Newcomer, at: usize) -> String {
     format!("{}_phase_{}", newcomer.name, at + 1)
 }
@@ -401,8 +402,8 @@ fn moves_aside(lane: &Lane, to_m: f64, by_m: f64, aside: AsideBy) -> Element {
     private(Element::new("LateralAction").holding(moves))
 }
 
-/// The lanes along which a way leads, if it leads along lanes: the place of a station, and of the lanes from that one on a place in
-/// each, and the end. The places but for the first are the same wherever on the way it begins.
+/// The lanes along which a way leads, if it leads along lanes: the place of a station, a place in each lane from that one
+/// on, and the end. The places but for the first are the same wherever on the way it begins.
 fn lanes_along(map: &RoadMap, path: &Path, from_m: f64) -> Option<(LanePlace, Vec<LanePlace>)> {
     let end_m = path.length_m();
     let in_lane = |lane: LaneIndex, at_m: f64| {

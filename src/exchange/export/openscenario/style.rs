@@ -1,8 +1,8 @@
-//! How a file is to be, and what all of its parts say alike.
+//! The style of a file, and the elements that all of its parts share.
 
 use crate::export::xml::Element;
 
-/// What must not be met is so far beneath its place, m.
+/// An entity that must not be met is this far beneath its place, m.
 pub const BENEATH_M: f64 = 100.0;
 
 /// The standard's version.
@@ -13,7 +13,7 @@ pub enum Version {
     Carla,
 }
 
-/// What the file says of the ego vehicle.
+/// How the file describes the ego vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ego {
     /// It drives as it was recorded.

@@ -1,7 +1,7 @@
-//! What a phase waits for, as conditions of OpenSCENARIO: comparisons whose sides are sums of what its conditions compare.
+//! The conditions of a phase as conditions of OpenSCENARIO: comparisons whose sides are sums of the compared facts.
 //!
-//! A distance has a sign in avastra, and none in OpenSCENARIO. So less than a gap is written of a first phase alone, which comes when the
-//! gap first closes, and more than a gap where both orders of the two are asked for.
+//! A distance has a sign in avastra, and none in OpenSCENARIO. So less than a gap is written for a first phase alone,
+//! which comes when the gap first closes. More than a gap is written where both orders of the two are asked for.
 
 use avastra_lang::model::NpcFacts;
 use avastra_lang::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
@@ -26,10 +26,10 @@ const CONDITIONS_MAX: usize = 16;
 /// Groups of conditions, of which one must hold, each as what stands in a `Condition`.
 pub type Groups = Vec<Vec<Element>>;
 
-/// What somebody waits for in a phase. `own` is its place among the players of the cast.
+/// The conditions that a road user waits for in a phase. `own` is its place among the players of the cast.
 ///
 /// # Errors
-/// What has no counterpart, in words.
+/// The condition that has no counterpart, in words.
 pub fn groups(cast: &Cast, own: usize, course: &Course, phase: usize, expr: &Expr) -> Result<Groups, String> {
     let waiting = Waiting { cast, own, course };
     let groups = waiting.groups(expr)?;
@@ -54,10 +54,10 @@ enum Who {
     Newcomer(usize),
 }
 
-/// What is asked of somebody, with its coefficient.
+/// A fact of a road user, with its coefficient.
 #[derive(Clone, Copy, PartialEq)]
 struct Part {
-    /// The ego vehicle, where nobody is asked.
+    /// The ego vehicle, if the fact is about no road user.
     who: Who,
     fact: Fact,
     factor: f64,
@@ -74,7 +74,7 @@ struct Gap {
     behind: Who,
     /// m.
     bound_m: f64,
-    /// Of the speed of the one behind, s.
+    /// Is multiplied by the speed of the road user behind, s.
     bound_s: Option<f64>,
     is_more: bool,
 }
@@ -271,7 +271,8 @@ impl Waiting<'_> {
         Ok(by_entity(self.name(gap.behind), element))
     }
 
-    /// Where an end of somebody is along the ego vehicle's route at the start, m; that of the ego vehicle lies so far behind its front.
+    /// The station of a road user's end on the ego vehicle's route at the start, m. The ego vehicle's end lies
+    /// `behind_front_m` behind its front.
     fn end_m(&self, who: Who, of: fn(&NpcFacts) -> f64, behind_front_m: f64) -> f64 {
         match who {
             Who::Ego => self.cast.ego_front_m - behind_front_m,
@@ -279,7 +280,7 @@ impl Waiting<'_> {
         }
     }
 
-    /// How far an end of somebody along the ego vehicle's route lies from the reference point that the file has, m.
+    /// How far an end of a road user along the ego vehicle's route lies from the reference point that the file has, m.
     fn overhang_m(&self, who: Who, is_front: bool) -> f64 {
         let (length_m, ahead_m) = match who {
             Who::Ego => (VehicleParameters::MKZ.length_m, -VehicleParameters::MKZ.rear_axle_to_centre_m()),

@@ -1,4 +1,4 @@
-//! What each code means, for `avastra explain`: one page of prose, a wrong example and a right one.
+//! The meaning of each code, for `avastra explain`: one page of prose, a wrong example and a right one.
 //!
 //! The pages are files in `pages/`. The tests compile their examples as `scenarios/example.ava`.
 
@@ -39,7 +39,7 @@ pub fn page(code: &str) -> Option<&'static Page> {
 }
 
 impl Page {
-    /// What the code means, in a few words.
+    /// The meaning of the code, in a few words.
     pub fn title(&self) -> &'static str {
         let line = self.text.lines().next().unwrap_or_default();
         line.split_once(": ").map_or(line, |(_, title)| title)

@@ -65,7 +65,7 @@ pub struct PolicyOrigin {
     pub without: Vec<String>,
 }
 
-/// What a policy claims to achieve, on episodes that can be played again.
+/// The results that a policy claims, on episodes that can be played again.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PolicyClaims {
@@ -81,12 +81,12 @@ pub struct PolicyClaims {
     pub return_mean: f64,
     /// SHA-256 over the traces of all episodes, in order.
     pub trace: String,
-    /// What the readable face achieves on the same episodes.
+    /// The results of the readable face on the same episodes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rules: Option<RulesClaims>,
 }
 
-/// What a policy claims of its readable face. Shares and means are rounded to four decimals.
+/// The results that a policy claims for its readable face. Shares and means are rounded to four decimals.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RulesClaims {

@@ -36,7 +36,7 @@ pub fn expression(value: &Value) -> Expr {
 /// Fields as a record.
 ///
 /// # Errors
-/// What is wrong, and where.
+/// The mistake, and where it is.
 pub(crate) fn record(fields: &[Field]) -> Result<Map<String, Value>, (Span, &'static str)> {
     let mut entries = Map::new();
     for field in fields {

@@ -139,7 +139,7 @@ pub const VARIABLES: &[Variable] = &[
     between(("newest_age", "newestAge"), "s", 0.0, 60.0),
 ];
 
-/// What the road user does that an action made appear last.
+/// The behaviour of the road user that an action spawned last.
 const NEWEST: &[(&str, f32)] = &[
     ("None", 0.0),
     ("DriveAhead", 1.0),

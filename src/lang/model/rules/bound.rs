@@ -1,4 +1,4 @@
-//! What the conditions of rules and `where`s say about single numbers: `speed <= road.limit`.
+//! The limits that the conditions of rules and `where`s set to single numbers: `speed <= road.limit`.
 
 use crate::model::effort;
 use crate::model::expr::{Comparison, Expr, ExprKind};

@@ -1,5 +1,5 @@
-//! What a row's values must satisfy, piece by piece: each `where`, and each rule that binds the action, with the
-//! parameters that decide it.
+//! The clauses that a row's values must satisfy: each `where`, and each rule that binds the action, with the parameters
+//! that decide it.
 
 use std::collections::BTreeSet;
 

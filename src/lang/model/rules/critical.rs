@@ -20,7 +20,7 @@ use crate::model::vocabulary::{Known, NumberWord};
 /// The most forms that one expression may have, by the arms of its `match`es.
 const FORMS_MAX: usize = 64;
 
-/// What an expression is, as far as the open numbers leave it.
+/// The form of an expression, as far as the open numbers leave it.
 #[derive(Debug, Clone, PartialEq)]
 enum Form {
     Known(Value),
@@ -71,7 +71,7 @@ pub(super) fn polynomials<'c>(
             Source::Where(parameter) => space.actions[action].parameters[parameter].condition.as_ref(),
             Source::Rule(rule) => match space.rules[rule].body.demand(action) {
                 Some(Demand::Holds(condition)) => Some(condition),
-                // What decides the move was found with the effect that sets the state.
+                // The effect that sets the state already gave the numbers that decide the move.
                 Some(Demand::Moves { .. }) | None => None,
             },
         };

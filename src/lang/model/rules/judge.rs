@@ -17,8 +17,8 @@ pub struct Candidate<'a> {
     pub before: &'a Memory,
     /// The memory after the action.
     pub after: &'a Memory,
-    /// What the world says. Without it, a rule that asks the world holds; a rule that asks about a spawn also
-    /// holds where there is none.
+    /// The facts of the world. Without them, a rule that asks the world holds. A rule that asks about a spawn also holds
+    /// where there is none.
     pub world: Option<&'a WorldFacts>,
 }
 
@@ -206,8 +206,8 @@ impl<'a> RowRules<'a> {
         })
     }
 
-    /// The parameters, states and facts of the world that a broken condition names, with their values, and what was
-    /// wanted: the first broken bound, or the right side of a comparison that bounds no single number.
+    /// The parameters, states and facts of the world that a broken condition names, with their values, and the wanted
+    /// value. That is the first broken bound, or the right side of a comparison that bounds no single number.
     fn figures(
         self,
         rule: Option<usize>,
@@ -232,7 +232,7 @@ impl<'a> RowRules<'a> {
             }
             other => self.space.show(other, expr.ty),
         };
-        // What is computed, without the digits that binary fractions leave; what was measured, to a thousandth of its unit.
+        // Computed values lose the digits that binary fractions leave; measured values have a thousandth of their unit.
         let value = |expr: &Expr| to(1e9, expr);
         let measured = |expr: &Expr| to(1e3, expr);
         let is_known = |expr: &Expr| evaluate(expr, &self.space.functions, &facts).number().is_finite();

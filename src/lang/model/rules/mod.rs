@@ -7,9 +7,9 @@
 //!    `--without`.
 //! 2. [`RowRules`] is one row on one road under the rules in force. Each of its rules makes a [`Demand`]
 //!    on the row's action: a condition that must hold, or the moves that a state may make.
-//! 3. [`RowRules::solve`] chooses values from exactly what the clauses of a row leave: its rules and its `where`s,
-//!    each with the parameters that decide it ([`Clause`]). What it cannot solve it says.
-//! 4. `bound` takes from the conditions what they say about single numbers, for example `speed <= road.limit`:
+//! 3. [`RowRules::solve`] chooses values from exactly those that the clauses of a row leave: its rules and its `where`s,
+//!    each with the parameters that decide it ([`Clause`]). It says which conditions it cannot solve.
+//! 4. `bound` takes the limits of single numbers from the conditions, for example `speed <= road.limit`:
 //!    for proofs, and for the words of a refusal.
 //! 5. [`RowRules::breaches`] has the last word. It takes a complete [`Candidate`] (values, the memory before
 //!    and after, what the world says) and returns every rule in force that the candidate breaks.
@@ -58,7 +58,7 @@ pub struct RowRules<'a> {
     pub in_force: &'a RulesInForce,
 }
 
-/// What a rule demands of an action.
+/// The demand of a rule on an action.
 #[derive(Debug, Clone, Copy)]
 pub enum Demand<'a> {
     /// The condition holds. State in it is the state after the action.
@@ -88,7 +88,7 @@ impl RuleBody {
         }
     }
 
-    /// What must hold when a road user of the action changes lanes.
+    /// The condition that must hold when a road user of the action changes lanes.
     pub(crate) fn during(&self, action: usize) -> Option<&Expr> {
         let RuleBody::During(bindings) = self else { return None };
         bound(bindings, action)
@@ -104,7 +104,7 @@ impl RuleBody {
         }
     }
 
-    /// What the rule demands of an action when it is chosen; `None` if it demands nothing then.
+    /// The demand of the rule on an action when it is chosen; `None` if it demands nothing then.
     pub fn demand(&self, action: usize) -> Option<Demand<'_>> {
         match self {
             RuleBody::Holds(bindings) => bound(bindings, action).map(Demand::Holds),

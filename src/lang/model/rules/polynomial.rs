@@ -1,7 +1,7 @@
 //! Polynomials in the numbers that are still to be drawn, and the places where their signs change.
 //!
-//! Plain arithmetic over `f64`: a root is found to the last digits, not exactly. What it decides is only where
-//! conditions are tried; the conditions themselves are judged by evaluation.
+//! Plain arithmetic over `f64`: a root is found to the last digits, not exactly. It decides only where conditions are
+//! tried; the conditions themselves are judged by evaluation.
 
 use crate::model::effort;
 

@@ -7,7 +7,7 @@ const GRID: f64 = 1.0 / 64.0;
 /// else have three values.
 const FEWEST_STEPS: f64 = 8.0;
 
-/// What is left of a range: parts in rising order that do not touch.
+/// The rest of a range: parts in rising order that do not touch.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Room {
     parts: Vec<Part>,

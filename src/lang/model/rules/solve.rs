@@ -1,9 +1,9 @@
 //! Choosing the drawn values of a row from exactly what its rules leave, one parameter after the other.
 //!
-//! The room of a number is found by trying: between two neighbouring places where a clause may change (`critical`)
-//! every clause holds everywhere or nowhere, but for a part of 1e-9 beside the place, where numbers count as equal. So one
-//! try in between and one at each place decide. A try is judged as
-//! drawing and replaying judge ([`RowRules::breaches`]).
+//! The room of a number is found by trying. Between two neighbouring places where a clause may change (`critical`), every
+//! clause holds everywhere or nowhere. Only a part of 1e-9 beside the place differs, where numbers count as equal. So one
+//! try in between and one at each place decide. A try is judged
+//! as drawing and replaying judge ([`RowRules::breaches`]).
 //!
 //! 1. Forwards: each parameter gets what the clauses leave that no later parameter decides. That is nearly always
 //!    enough, and cheap.
@@ -11,8 +11,8 @@
 //!    only the values that leave values to all later ones. The places where that may change come from polynomials
 //!    without the later numbers (`polynomial::project`).
 //!
-//! Both draw from the same values with the same shares: what forwards fails is drawn again by the second way. What that
-//! leaves after choices from lists is kept for further draws: there are few of them, and they come again.
+//! Both draw from the same values with the same shares: where the first way fails, the second draws again. Its remaining
+//! values after choices from lists are kept for further draws: there are few of them, and they come again.
 
 use std::borrow::Cow;
 use std::cell::Cell;
@@ -35,7 +35,7 @@ pub const TRIES_MAX: usize = 50_000;
 /// part of 1e-9.
 const WELL_WITHIN: f64 = 1.0;
 
-/// What is known before a row is solved.
+/// The facts known before a row is solved.
 #[derive(Clone, Copy)]
 pub struct Before<'a> {
     pub memory: &'a Memory,
@@ -99,7 +99,7 @@ impl<'a> RowRules<'a> {
         self.solver(given, open, before)?.solve(choose)
     }
 
-    /// What [`RowRules::solve`] needs, to be used for several solutions.
+    /// Prepares [`RowRules::solve`] for several solutions.
     ///
     /// # Errors
     /// The clause that is in the way of all of them: nothing that is open decides it.
@@ -178,7 +178,7 @@ pub struct Solver<'a> {
     order: Vec<usize>,
     /// By place of the order.
     places: Vec<Place>,
-    /// What backwards left before.
+    /// Results of earlier draws by the second way.
     known_choices: Vec<KnownChoices>,
     /// A value for each parameter of the action. A parameter that is still to be chosen has any value of its type.
     given: Vec<Value>,
@@ -196,11 +196,11 @@ struct Place {
     decided: Vec<usize>,
     /// Whether one of them needs an earlier choice.
     depends: bool,
-    /// What is left to it, once that is known, if it does not depend on other choices: the same in every solution.
+    /// Its remaining values once known, if they do not depend on other choices: the same in every solution.
     kept: Option<Left>,
 }
 
-/// What the clauses leave to a parameter.
+/// The values that the clauses leave to a parameter.
 struct Left {
     choices: Choices,
     /// The clause that the last broken try broke.
@@ -302,7 +302,7 @@ impl<'a> Solver<'a> {
         Ok(self.values.clone())
     }
 
-    /// What is left to the parameter at this place of the order after the choices before it.
+    /// The values left to the parameter at this place of the order after the choices before it.
     fn left(&mut self, place: usize) -> Left {
         let local = self.order[place];
         // Taken out while the values change.
@@ -344,7 +344,7 @@ impl<'a> Solver<'a> {
     }
 
     /// The number that the only clause sets the parameter to, as `distance == gap(…)` does, if it lies well within the
-    /// range: no other place that would be tried is then equal to it. Nearly all draws of a distance end here.
+    /// range. No other place to try is then equal to it. Nearly all draws of a distance end here.
     fn set_to(&self, local: usize, clauses: &[usize]) -> Option<f64> {
         let [clause] = clauses else { return None };
         let (clause, action) = (self.clause(*clause), self.rules.row.action);
@@ -390,7 +390,7 @@ impl<'a> Solver<'a> {
         Ok(self.values.clone())
     }
 
-    /// What leaves values to all later parameters.
+    /// The values that leave values to all later parameters.
     fn completable(&mut self, place: usize) -> Rc<Choices> {
         let after = self.listed_before(place);
         let mut known = self.known_choices.iter().filter(|known| known.place == place);
@@ -416,7 +416,7 @@ impl<'a> Solver<'a> {
         });
         let is_exact = self.is_exact.get();
         self.is_exact.set(was_exact && is_exact);
-        // What ran out of tries may leave more another time.
+        // A search that ran out of tries may leave more another time.
         if let Some(after) = after.filter(|_| self.before.tries.get() > 0) {
             let choices = Rc::clone(&choices);
             self.known_choices.push(KnownChoices { place, after, choices, is_exact });
@@ -451,7 +451,7 @@ impl<'a> Solver<'a> {
         let Some(local) = self.order.get(place) else { return true };
         match &self.action().parameters[*local].domain {
             Domain::Values(values) => {
-                // What no clause needs leads on with any value or with none.
+                // A parameter that no clause needs leads on with any value or with none.
                 let tried = if self.places[place].is_asked { values.len() } else { 1 };
                 values.iter().take(tried).any(|value| self.leads_on(place, *value))
             }

@@ -1,8 +1,8 @@
 //! The states with which an episode may begin.
 //!
-//! A rule without `on` that asks about states, and perhaps the road, `step` and `elapsed`, holds from the start on ([`RuleDef::start`]):
-//! the actions that set such a state keep it, and no other action can break it. A rule with `on` is about the actions
-//! that it names, and says nothing about the start.
+//! A rule without `on` that asks about states, and perhaps the road, `step` and `elapsed`, holds from the start on
+//! ([`RuleDef::start`]). The actions that set such a state keep the rule, and no other action can break it. A rule with
+//! `on` is about the actions that it names, and says nothing about the start.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -34,7 +34,7 @@ pub struct NoStart {
 }
 
 impl NoStart {
-    /// What is wrong, without the road.
+    /// The mistake, without the road.
     pub(crate) fn words(&self) -> String {
         match self.is_too_large {
             true => format!("whether an episode can begin under rule `{}` is not known", self.rule),
@@ -62,7 +62,7 @@ impl Space {
         rules: &RulesInForce,
         seed: u64,
     ) -> Result<Memory, NoStart> {
-        // What the first draw cannot keep is drawn again from all that is left, with the same odds.
+        // States of the first draw that break a rule are drawn again from all values left, with the same odds.
         let mut memory = begun;
         if self.broken_start(&memory, &road.facts, rules).is_none() {
             return Ok(memory);

@@ -75,7 +75,7 @@ impl Reader {
             _ => None,
         };
         let undriven = undriven.map(|what| LeftOut { what, for_vehicles });
-        // What is beside the road is left out without a warning.
+        // Lanes that are not for vehicles are left out without a warning.
         if let Some(LeftOut { what, for_vehicles: true }) = &undriven {
             self.ignore(format!("lanes {what}"));
         }
@@ -152,8 +152,9 @@ impl Reader {
     }
 }
 
-/// What a type of lane is: whether vehicles drive on it in one direction, whether some kinds may, and what it is
-/// to people on foot where no car drives on it; `None` for verges and medians, where they may stand but do not walk along.
+/// The use of a type of lane: whether vehicles drive on it in one direction, whether some kinds may, and its use by
+/// pedestrians where no car drives on it. The last is `None` for verges and medians, where pedestrians may stand but do
+/// not walk along.
 fn lane_type(kind: &str) -> (bool, bool, Option<StripKind>) {
     match kind {
         "driving" | "entry" | "exit" | "onRamp" | "offRamp" | "connectingRamp" | "slipLane" | "mwyEntry"

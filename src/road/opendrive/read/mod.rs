@@ -55,7 +55,7 @@ pub fn well_formed(text: &str) -> Result<roxmltree::Document<'_>, RoadError> {
     parsed.map_err(|error| not_xml(text, &error))
 }
 
-/// Where a document type begins that has declarations of its own, which may let a short text stand for a long one.
+/// Where a document type with internal declarations begins, which may let a short text stand for a long one.
 fn declaring_type(text: &str) -> Option<usize> {
     let declares = |(begin, _): &(usize, &str)| {
         let mut quote = None;
@@ -418,7 +418,8 @@ fn cubics<'a, 'input: 'a>(
     pieces.collect::<Result<_, _>>().map(Cubics::new)
 }
 
-/// What a road's end touches; `None` of a link to the middle of a road, as in virtual junctions, which have their own warning.
+/// The element that a road's end touches. `None` for a link to the middle of a road, as in virtual junctions, which have
+/// their own warning.
 fn road_link(link: Element) -> Result<Option<RoadLink>, RoadError> {
     if link.attribute("elementS").is_some() {
         return Ok(None);

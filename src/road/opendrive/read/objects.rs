@@ -6,7 +6,7 @@ use super::super::elements::{ObjectElement, ObjectKind, Outline};
 use super::super::xml::Element;
 use super::{ROAD_M_MAX, Reader};
 
-/// An object that begins so high above the road is in nobody's way, m.
+/// An object that begins this high above the road is no obstacle, m.
 const ABOVE_M: f64 = 3.0;
 
 /// Limit on the copies of one crosswalk.
@@ -116,7 +116,7 @@ impl Reader {
         Ok(copies.collect())
     }
 
-    /// Offsets of an object, m: ahead of its own station, and to the left of the reference line.
+    /// Offsets of an object, m: ahead of its station, and to the left of the reference line.
     fn repeats(&mut self, object: Element, s_m: f64, t_m: f64) -> Result<Vec<(f64, f64)>, RoadError> {
         let mut places = Vec::new();
         for repeat in object.children("repeat") {
@@ -144,7 +144,7 @@ impl Reader {
     }
 }
 
-/// What an object is to people on foot; `None` for one that is nothing to them, like paint.
+/// The kind of an object for pedestrians; `None` for an object that does not concern them, like paint.
 fn object_kind(kind: &str) -> Option<ObjectKind> {
     match kind {
         "crosswalk" => Some(ObjectKind::Crosswalk),

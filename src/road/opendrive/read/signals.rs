@@ -55,8 +55,8 @@ impl Reader {
     }
 }
 
-/// What a signal means: OpenDRIVE's own catalogue for lights; for signs the numbers of national regulations, or
-/// else the name. Older files write the catalogue's numbers with dots.
+/// The meaning of a signal. For lights: OpenDRIVE's own catalogue. For signs: the numbers of national
+/// regulations, or else the name. Older files write the catalogue's numbers with dots.
 fn meaning(signal: Element, kind: &str) -> Option<Meaning> {
     let number = kind.replace('.', "").parse::<u32>().unwrap_or(0);
     match number {

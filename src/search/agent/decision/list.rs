@@ -1,7 +1,7 @@
 //! A decision tree becomes a list of rules, of which the first that applies acts.
 //!
-//! A split becomes two lines: the smaller branch with its test, then the other without one. A leaf becomes
-//! a list of rows, because the variables do not tell which rows are legal: first the row that most of the
+//! A split becomes two lines: the smaller branch with its test, then the other without one. A leaf becomes a
+//! list of rows, because the variables do not tell which rows are legal. First comes the row that most of the
 //! stake wants, then the row that most of the stake wants where the first is not open, and so on.
 
 use crate::agent::checked::{SettingsError, require, within};

@@ -27,7 +27,7 @@ impl Visit {
         f64::from(self.q_values[self.best]) - lowest
     }
 
-    /// What is lost by choosing a row: the whole stake if it is not open, or if no row is chosen.
+    /// The loss from choosing a row: the whole stake if the row is not open, or if no row is chosen.
     pub fn loss(&self, row: Option<usize>) -> f64 {
         match row.filter(|&row| self.open[row]) {
             Some(row) => f64::from(self.q_values[self.best] - self.q_values[row]),
@@ -73,7 +73,7 @@ pub(super) fn grow(visits: &[Visit], variables: &[usize], bounds: Bounds) -> Tre
     let grower = Grower { visits, stakes, variables, bounds };
     let mut buds = vec![grower.bud((0..visits.len()).collect(), 0)];
     for _ in 1..bounds.leaves {
-        // Of equal gains the first counts.
+        // If gains are equal, the first counts.
         let gain = |at: usize| Some((at, buds[at].split.as_ref()?.gain));
         let gains = (0..buds.len()).rev().filter_map(gain);
         let Some((at, _)) = gains.max_by(|a, b| a.1.total_cmp(&b.1)) else { break };

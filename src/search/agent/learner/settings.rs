@@ -50,8 +50,8 @@ pub struct LearnerSettings {
     pub updates_per_step: u32,
     /// Updates between two copies of the online network to the target network.
     pub target_period_updates: u64,
-    /// What acts in the end is the running mean of the online network over its updates, and this is the share of the
-    /// mean that an update keeps, in `[0, 1)`: 0.99 averages over some hundred updates. 0: the last network acts.
+    /// The running mean of the online network over its updates acts in the end. This is the share of the mean that
+    /// an update keeps, in `[0, 1)`: 0.99 averages over some hundred updates. 0: the last network acts.
     pub average_decay: f64,
 
     // The target.

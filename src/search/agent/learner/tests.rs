@@ -65,7 +65,7 @@ pub fn episode(rewards: &[f64]) -> Trajectory {
     ended(rewards.iter().enumerate().map(|(at, &reward)| experience(at, at, reward, rows)).collect(), 9, rows)
 }
 
-/// An episode that ended of its own in a state.
+/// An episode that ended by itself in a state.
 fn ended(steps: Vec<Experience>, last: usize, rows: usize) -> Trajectory {
     Trajectory { last: sight(last), ..Trajectory::plain(steps, rows) }
 }

@@ -47,8 +47,8 @@ fn stacked(batch: &[&Transition], inputs: fn(&Transition) -> &Vec<f32>) -> Array
     Array2::from_shape_vec(shape, values).expect("all states have the same features")
 }
 
-/// What the Q-values should have been, shape `(batch,)`: the reward, and the discounted value of the next
-/// state by the target network, in the legal row that `choosing` likes best there.
+/// The target Q-values, shape `(batch,)`: the reward, and the discounted value of the next state by the
+/// target network, in the legal row that `choosing` likes best there.
 ///
 /// Both arrays are Q-values of the next states, shape `(batch, rows)`: `values` by the target network, and
 /// `choosing` by the online network (Double DQN, Eq. 4) or by the target network too (DQN).

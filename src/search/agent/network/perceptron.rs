@@ -3,8 +3,8 @@
 //! All parameters lie in one vector, layer by layer, each its weights `(inputs, outputs)` by rows and
 //! then its biases. So an optimiser, a copy, a file and a digest each see one slice of numbers.
 //!
-//! The dueling head (Wang et al., 2016, Eq. 9) is one more output that holds the state's value; the
-//! streams share all hidden layers, which is all that networks of this size need.
+//! The dueling head (Wang et al., 2016, Eq. 9) is one more output that holds the state's value. The streams
+//! share all hidden layers, which is all that networks of this size need.
 
 use ndarray::{Array2, ArrayView1, ArrayView2, Axis, s};
 

@@ -7,7 +7,7 @@ use avastra_base::rng::Rng;
 
 use super::sum_tree::SumTree;
 
-/// What a learner learns from: a state, what was done in it, and what came of it.
+/// A transition to learn from: a state, the row chosen in it, and the outcome.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
     /// Features of the state, shape `(inputs,)`.
@@ -15,7 +15,7 @@ pub struct Transition {
     pub row: u32,
     /// Discounted sum of the rewards on the way to the next state.
     pub reward: f32,
-    /// What the value of the next state is multiplied by: 0 if there is none.
+    /// Factor for the value of the next state: 0 if there is none.
     pub discount: f32,
     pub next_inputs: Vec<f32>,
     /// Rows that may be chosen in the next state, shape `(rows,)`.

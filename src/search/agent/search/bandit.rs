@@ -25,8 +25,8 @@ pub struct BanditSettings {
     /// How much a short record is doubted: the standard deviation that the worth of one choice is taken to
     /// have, at least 0. In the search doubtful rows are tried, afterwards they are avoided.
     pub doubt: f64,
-    /// What a choice is worth that was made a step before the one that made the obstacle appear, in
-    /// `[0, 1]`; two steps before, its square.
+    /// Worth of a choice a step before the choice that made the obstacle appear, in `[0, 1]`; two steps
+    /// before, its square.
     pub credit_discount: f64,
     /// Choices after which a situation's own record counts as much as that of all situations, above 0.
     pub prior_choices: f64,
@@ -80,7 +80,7 @@ pub struct Bandit {
     made: Vec<(u32, usize)>,
 }
 
-/// What the bandit keeps from episode to episode.
+/// The state that the bandit keeps from episode to episode.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 struct SavedBandit {
     steps: u64,

@@ -1,5 +1,5 @@
-//! The most trivial search: a fixed list of rows, of which the first legal one acts, whatever the moment. What it
-//! finds, every other agent has to beat.
+//! The most trivial search: a fixed list of rows, of which the first legal one acts, whatever the moment. Every
+//! other agent has to beat its result.
 //!
 //! In training each episode is led by one row, tried by Thompson sampling (1933) over the counted collisions of the
 //! episodes in which it acted. Where the leader is not legal, the next of the list acts, and so the leader also gets
@@ -68,7 +68,7 @@ pub struct Constant {
     has_led: bool,
 }
 
-/// What the search keeps from episode to episode.
+/// The state that the search keeps from episode to episode.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 struct SavedConstant {
     steps: u64,

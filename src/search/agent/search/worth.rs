@@ -106,9 +106,9 @@ impl Worth {
     }
 }
 
-/// What each choice of an episode was worth: 1 for each crash that counts whose obstacle it made appear,
-/// and `discount` to the power of n if it came n choices before such a one. A crash with an obstacle that
-/// none of these choices made appear is credited to the choice at which it happened.
+/// The worth of each choice of an episode: 1 for each crash that counts whose obstacle it made appear, and
+/// `discount` to the power of n if it came n choices before such a choice. A crash with an obstacle that none
+/// of these choices made appear is credited to the choice at which it happened.
 pub fn worths(episode: &Trajectory, discount: f64) -> Vec<f64> {
     let mut worths = vec![0.0; episode.steps.len()];
     for (at, step) in episode.steps.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! The shipped spaces as tables, and draws against what proofs say of them. What each rule refuses is tested in
+//! The shipped spaces as tables, and draws against what proofs say of them. Each rule's refusals are tested in
 //! `tests/it/rules.rs`.
 
 mod promise;

@@ -87,7 +87,7 @@ fn a_first_draw_lies_where_its_shares_say() {
     let (near, slow_mps) = drawn(&[0.5, 0.0, 0.0]);
     let (far, fast_mps) = drawn(&[0.5, 0.9, 0.99]);
     assert!(near != far && slow_mps == 0.5 && (1.35..=1.4).contains(&fast_mps), "{slow_mps} {fast_mps}");
-    // What is left out is drawn by chance, and so is all of it without shares.
+    // A parameter without a share is drawn by chance, and so are all of them without shares.
     assert_eq!(drawn(&[0.5, 0.9]).0, far);
     assert_eq!(table.offers_at(&situation, &[]), table.offers(&situation));
 }
@@ -125,7 +125,7 @@ fn declared(declarations: &str) -> ActionTable {
     )
 }
 
-/// What a space says of its only row, in so many episodes.
+/// The offers that a space makes for its only row, in so many episodes.
 fn offered(table: &ActionTable, episodes: u64) -> Vec<Result<Draw, Refusal>> {
     let memory = table.space().initial_memory(1);
     let rules = RulesInForce::by_default(table.space());
@@ -139,7 +139,7 @@ fn offered(table: &ActionTable, episodes: u64) -> Vec<Result<Draw, Refusal>> {
     (0..episodes).map(offer).collect()
 }
 
-/// What a distance may be changes where its magnitude, or the smaller of two, does.
+/// The allowed distances change where the distance's magnitude, or the smaller of two distances, changes.
 #[test]
 fn draws_keep_to_rules_about_magnitudes_and_the_least() {
     for (rule, is_kept) in [
@@ -179,8 +179,8 @@ fn an_order_reaches_the_vehicle_it_names() {
     }
 }
 
-/// What is kept from one solution for the next changes none. Here large vehicles have no distance: every third draw meets
-/// one and is made again backwards.
+/// Values that the solver keeps for its next solution change no solution. Here large vehicles have no distance: every
+/// third draw meets one and is made again backwards.
 #[test]
 fn a_solver_used_again_draws_what_a_new_one_draws() {
     let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");

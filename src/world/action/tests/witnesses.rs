@@ -33,8 +33,8 @@ pub(super) fn compiled(text: &str) -> Loaded {
     load(Path::new("a.ava"), &read).unwrap()
 }
 
-/// Equalities that depend on each other are solved in the order of their dependence, whatever the order of
-/// declaration: by drawing, and by the search for witnesses.
+/// Equalities that depend on each other are solved in the order of their dependence, whatever the order of declaration.
+/// Both drawing and the search for witnesses do so.
 #[test]
 fn a_chain_of_equalities_is_solved_from_its_end() {
     let speeds =

@@ -1,6 +1,6 @@
-//! What drivers are told to do to the side: to change to a lane seen from the ego vehicle, and to drive beside the middle
-//! of their lane. A lane change begins when markings, rules and vehicles beside it allow it. A move within the lane begins
-//! at once and asks nobody.
+//! Lateral orders to drivers: to change to a lane seen from the ego vehicle, and to drive at an offset from the middle
+//! of their lane. A lane change begins when markings, rules and vehicles beside it allow it. A move within the lane
+//! begins at once, without regard to others.
 
 use avastra_base::geometry::{Pose, SmoothStep, smooth_step};
 use avastra_lang::model::command::{AsideBy, Command};
@@ -44,8 +44,8 @@ impl Driver {
         }
     }
 
-    /// Begins what it was told to do to the side and has not begun: the change to the last lane on the way to the one that is
-    /// meant ends at the place that it was told.
+    /// Begins the lateral order that has not begun. The change to the last lane on the way to the wanted one ends at
+    /// the ordered offset.
     #[inline]
     pub fn begin_aside(&mut self, view: &View) {
         let Some(aside) = self.aside.as_deref_mut() else { return };
@@ -76,8 +76,8 @@ impl Driver {
         meant.is_ok_and(|meant| meant == self.way.lane_at(self.station_m).0)
     }
 
-    /// Begins a change to the next lane on the way to the one that is meant, if the road and others leave the place; whether
-    /// it is in that lane already.
+    /// Begins a change to the next lane on the way to the wanted one, if the road and others leave the place. Returns
+    /// whether the vehicle is in the wanted lane already.
     fn go_over(&mut self, lane: LaneChoice, told: Option<AsideBy>, view: &View) -> bool {
         let View { this, around, .. } = *view;
         // An error: in a junction, or where that lane has not begun yet.

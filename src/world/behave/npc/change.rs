@@ -32,9 +32,9 @@ use avastra_lang::model::body::BodyParameters;
 /// beside the corner of the front.
 const SPHERE_PART: f64 = 0.75;
 const SPHERE_M_MAX: f64 = 1.2;
-/// Of a change at the limit of the grip that is broken off, the move back may need so much more. Ours.
+/// After an aborted change at the limit of the grip, the move back may need this many times the grip. Ours.
 const GRIP_MORE: f64 = 1.1;
-/// It takes at most so much longer than it would by itself.
+/// The move back takes at most this many times its own duration.
 const LED_BACK_MAX: f64 = 8.0;
 /// Places at which the two are looked at together.
 const BENDS: u32 = 50;
@@ -44,8 +44,8 @@ const MERGE_S: f64 = 1.0;
 const CHANGE_M_MAX: f64 = 8.0;
 
 impl BrokenOff {
-    /// How long the move back takes that takes back a change of `over_m` to the side, s: `least_s`, or as much longer as the two
-    /// together need to keep within the grip, but for [`GRIP_MORE`].
+    /// How long the move back lasts that undoes a change of `over_m` to the side, s. It is `least_s`, or longer if both
+    /// moves together need it to keep within the grip times [`GRIP_MORE`].
     fn led_back_s(self, over_m: f64, least_s: f64, grip_mps2: f64) -> f64 {
         let most_mps2 = |back_s: f64| {
             let at = |nth: u32| {
@@ -64,18 +64,18 @@ impl BrokenOff {
     }
 }
 
-/// Whose wish a move to the side is.
+/// The origin of a lateral move: an order, or the driver's own wish.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Whose {
     /// The driver's own: it leaves others room.
     Own,
-    /// It was told to, and perhaps how. Then it begins as soon as nobody is beside it.
+    /// It was told to, and perhaps how. Then it begins as soon as the lane beside it is free.
     Told(Option<AsideBy>),
 }
 
 impl Driver {
-    /// Begins the next lane change of the plan if it is due, or one for its own gain, there is a lane, and it
-    /// is free.
+    /// Begins the next lane change of the plan if it is due, or one for its own gain. There must be a lane, and it must
+    /// be free.
     pub fn begin_change(&mut self, view: &View) {
         let View { this, size, around } = *view;
         let Some(next) = self.plan.last() else {
@@ -232,8 +232,8 @@ impl Driver {
         })
     }
 
-    /// Whether no vehicle is beside it at a place beside the middle of another lane or would be soon, and none has to brake hard
-    /// for it.
+    /// Whether no vehicle is or soon would be beside it at an offset in another lane, and none has to brake hard for
+    /// it.
     fn is_free(
         &self,
         (lane, station_m, ends_m): (&Lane, f64, f64),
@@ -248,8 +248,8 @@ impl Driver {
         let path = &lane.centre;
         let here = path.pose_at(station_m);
         let forward = here.forward();
-        // On a motorway a driver that closes in on a leader will brake, so vehicles behind close in on it faster than its present
-        // speed says.
+        // On a motorway a driver that closes in on a leader will brake. Vehicles behind therefore close in on it faster
+        // than its present speed says.
         let slowed_mps = match &self.leader {
             Some(leader) if around.scene.is_motorway => self.speed_mps.min(leader.speed_mps.max(0.0)),
             _ => self.speed_mps,
@@ -277,8 +277,8 @@ impl Driver {
     /// is where its centre was.
     pub fn advance_change(&mut self, way_m: f64, before: Vec2, size: &BodyParameters) -> Moved {
         let (from, wheelbase) = body_at(&self.way.path, self.station_m, size);
-        // The velocity is measured, because in a bend the centre of a body is slower than its way, and
-        // between two lanes it has neither lane's speed.
+        // The velocity is measured. In a bend the centre of a body is slower than its way, and between two lanes it has
+        // neither lane's speed.
         let at = |pose: Pose, lane_heading_rad| Moved {
             pose,
             forward: if pose.heading_rad == from.heading_rad { wheelbase.forward } else { pose.forward() },
@@ -315,8 +315,8 @@ impl Driver {
     }
 }
 
-/// Whether the street on which a way is at a station, or the next one if it is in a junction, has room for
-/// a lane change to a side.
+/// Whether the street on which a way is at a station has room for a lane change to a side. In a junction, the next
+/// street counts.
 pub fn can_change(around: &Around, way: &Way, station_m: f64, side: Side, request: &SpawnRequest) -> bool {
     let map = &around.scene.map;
     let in_junction = |lane: LaneIndex| map.lane(lane).junction.is_some();
@@ -337,8 +337,8 @@ fn change_duration_s(aside_m: f64, traffic: &TrafficProfile) -> f64 {
     (SMOOTH_STEP_SLOPE_MAX * aside_m / traffic.change_mps_max).max(traffic.change_s_min)
 }
 
-/// Gap that a change needs to another vehicle in the other lane, m, if it closes at a speed: the room of the
-/// profile, and enough for the one behind to slow down as hard as is safe.
+/// Gap that a change needs to another vehicle in the other lane, m, if it closes at a speed. It is the room of the
+/// profile, and enough for the rear vehicle to slow down as hard as is safe.
 fn change_gap_m(closing_mps: f64, traffic: &TrafficProfile) -> f64 {
     let slowing_m = braking_m(closing_mps, traffic.change_safe_mps2);
     traffic.change_room_m + slowing_m.max(closing_mps * traffic.change_time_s)

@@ -1,11 +1,10 @@
 //! Other drivers: along their way by the Intelligent Driver Model.
 //!
-//! IDM after Treiber, Hennecke and Helbing (2000), with the brakes of the body on the grip of the
-//! road and a kinematic floor, because IDM alone assumes brakes without limit. Ten times a second,
-//! which is their reaction time, drivers look for a leader (`leader`, `foresight`), for a reason to wait
-//! at a junction (`manners`) and for the occasion of their next lane change (`change`); in every tick
-//! they slow down for bends, stop at red lights and stop signs (`stop_line`) and follow. What else they do to the ego
-//! vehicle is the scenario's business.
+//! IDM after Treiber, Hennecke and Helbing (2000). Because IDM alone assumes brakes without limit, the brakes of the
+//! body on the grip of the road and a kinematic floor are added. Ten times a second, which is their reaction time,
+//! drivers look for a leader (`leader`, `foresight`). They also look for a reason to wait at a junction (`manners`) and
+//! for the occasion of their next lane change (`change`). In every tick they slow down for bends, stop at red lights
+//! and stop signs (`stop_line`) and follow. Everything else they do to the ego vehicle is the scenario's business.
 
 use avastra_base::geometry::smaller;
 use avastra_base::kinematics::STANDING_MPS;
@@ -18,7 +17,7 @@ use crate::state::obstacle::{Moved, choices};
 use crate::state::time::{DT_S, FRAME_TICKS};
 use crate::view::around::{Around, View};
 
-/// What slows down a vehicle without brakes, m/s²: the engine's drag. Ours.
+/// Deceleration of a vehicle without brakes, m/s²: the engine's drag. Ours.
 const DRAG_MPS2: f64 = 0.5;
 /// A wished speed below this is reached exactly, m/s, because the model's acceleration would oscillate around it. A vehicle
 /// that is asked to stand has a wish of 0.

@@ -1,10 +1,9 @@
 //! Outlines that would meet in a tight turn.
 //!
-//! Leaders are looked for in a corridor as wide as the vehicle, and conflict areas are between lanes;
-//! but a bus in a bend sweeps more than its lane. So inside junctions drivers look two seconds ahead:
-//! where both would be if they went on as they do, and stop before the outlines meet. They look at
-//! vehicles whose centre is ahead of their own, and at slower ones, into which their tail could swing.
-//! Commanded vehicles do not look at the ego vehicle in this way.
+//! Leaders are looked for in a corridor as wide as the vehicle, and conflict areas are between lanes. A bus in a bend,
+//! however, sweeps more than its lane. So inside junctions drivers look two seconds ahead: where both would be if they
+//! went on as they do, and stop before the outlines meet. They look at vehicles whose centre is ahead of their own, and
+//! at slower ones, into which their tail could swing. Commanded vehicles do not look at the ego vehicle in this way.
 
 use core::cell::LazyCell;
 

@@ -1,7 +1,7 @@
 //! Leaders: which road user a driver follows, and the acceleration that the gap to it allows.
 //!
-//! A leader is ahead on the own way and within a corridor as wide as the vehicle. What would come into
-//! the way beside that corridor is found in `foresight`.
+//! A leader is ahead on the own way and within a corridor as wide as the vehicle. Road users that would come into the
+//! way beside that corridor are found in `foresight`.
 
 use avastra_base::geometry::Pose;
 use avastra_base::kinematics::{STANDING_MPS, needed_mps2};
@@ -35,7 +35,7 @@ impl Driver {
             + self.speed_mps * (self.time_gap_s + self.speed_mps / (2.0 * COMFORT_MPS2))
             + size.length_m / 2.0;
         let mut nearest: Option<Leader> = None;
-        // The gap that it keeps to somebody is not that of following.
+        // A gap kept by order is not the gap of following.
         let kept = self.kept(around).map(|(kept, _)| kept.outline);
         for other in self.minded(around) {
             let outline = other.outline;
@@ -71,8 +71,9 @@ impl Driver {
         ego.chain(around.obstacles().take_while(move |_| minds_others).map(Other::from))
     }
 
-    /// Whether a lane change under way leads past a road user that stands in the lane that it leaves: when the front reaches
-    /// it, the vehicle is already beside it. A road user that moves is a leader until the end of the change.
+    /// Whether a lane change under way leads past a road user that stands in the lane it leaves. When the front reaches
+    /// the road user, the vehicle has then already moved beside it. A road user that moves is a leader until the end of
+    /// the change.
     fn evades(&self, leader: &Leader, size: &BodyParameters, other: Other) -> bool {
         let Some(change) = self.change.as_ref().filter(|_| other.velocity_mps.norm() < STANDING_MPS) else {
             return false;

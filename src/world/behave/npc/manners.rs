@@ -8,19 +8,19 @@
 //!   comes;
 //! - room behind it, if the vehicle ahead stands: no vehicle stops in an area.
 //!
-//! No driver waits for a vehicle that waits itself, stands at a red light or has yet to stop at a sign. A driver that sets out after
-//! a wait crosses all areas of the junction and counts as if inside them, so that four that wait for each
-//! other do not all set out at once: they look one after another, and the first to look goes. After
-//! [`PATIENCE_S`] of waiting a driver goes before any vehicle that stands, whatever the order of the lanes;
-//! after `GIVE_UP_S` it leaves the world as soon as the ego vehicle does not see it. A standstill in sight
-//! may last; an episode ends when the ego vehicle makes no progress.
+//! No driver waits for a vehicle that waits itself, stands at a red light or has yet to stop at a sign. A driver that
+//! sets out after a wait crosses all areas of the junction and counts as if inside them. So four drivers that wait for
+//! each other do not all set out at once: they look one after another, and the first to look goes. After [`PATIENCE_S`]
+//! of waiting a driver goes before any vehicle that stands, whatever the order of the lanes. After `GIVE_UP_S` it
+//! leaves the world as soon as the ego vehicle does not see it. A standstill in sight may last; an episode ends when
+//! the ego vehicle makes no progress.
 //!
-//! **Commanded vehicles and the ego vehicle.** A vehicle that an action made appear keeps these manners
-//! towards all other vehicles, but never yields to the ego vehicle at a junction: to cross or to turn
-//! before it is what its verb means. It follows, brakes for and does not push an ego vehicle that is
-//! ahead of it. Ambient vehicles yield to the ego vehicle as to all others, and expect that it will not
-//! stop whenever it moves and no red light holds it; those of a traffic profile that takes its right expect that it stops
-//! where they go first, and that it has not passed a red light.
+//! **Commanded vehicles and the ego vehicle.** A vehicle that an action made appear keeps these manners towards all
+//! other vehicles. It never yields to the ego vehicle at a junction: its verb means to cross or to turn before it. It
+//! follows, brakes for and does not push an ego vehicle that is ahead of it. Ambient vehicles yield to the ego vehicle
+//! as to all others. They expect that it will not stop whenever it moves and no red light holds it. Vehicles of a
+//! traffic profile that takes its right expect that it stops where they go first, and that it has not passed a red
+//! light.
 
 use core::cell::LazyCell;
 
@@ -39,8 +39,8 @@ use avastra_lang::model::vocabulary::TrafficRule;
 
 /// Time at rest after which a driver no longer waits for vehicles that stand, s. Ours.
 const PATIENCE_S: f64 = 8.0;
-/// Time between one vehicle in an area and the next, s: accepted gaps in towns are longer, but there the
-/// vehicle that accepts them does not move yet.
+/// Time between one vehicle in an area and the next, s. Accepted gaps in towns are longer, but there the vehicle that
+/// accepts them does not move yet.
 const GAP_S: f64 = 1.5;
 /// A vehicle that would have to brake harder than this does not stop any more, m/s² (as at a yellow light).
 const COMMITTED_MPS2: f64 = 3.0;
@@ -180,7 +180,8 @@ impl Driver {
             });
         let for_ego = || {
             let other = ego_passage(area, around);
-            // Whoever takes its right waits for an ego vehicle without one only where that is in its way already.
+            // A vehicle that takes its right waits for an ego vehicle without right of way only where that is in its
+            // way already.
             let is_wronged = || around.traffic.takes_right && (area.goes_first || around.ego_runs_red());
             let other = other.filter(|other| other.in_m <= 0.0 || !is_wronged());
             other.is_some_and(|other| waits(&own, &other, area.goes_first, impatient))

@@ -1,12 +1,12 @@
 //! Lane changes for a driver's own gain: the model MOBIL.
 //!
-//! After Kesting, Treiber and Helbing (2007): a driver changes lanes if what it gains in acceleration, and a
-//! part of what both followers gain or lose (`politeness`), is more than a threshold, which is lower to the
-//! right than to the left. Accelerations are those of the Intelligent Driver Model before and after the change.
-//! A driver takes followers for drivers like itself. Only ambient vehicles change lanes so; commanded ones do
-//! what their verb says. For both a change must be safe (`change`): MOBIL's criterion, that no follower has to
-//! brake harder than `b_safe`, is kept by its kinematics, because the model's own braking behind a vehicle that
-//! has just cut in comes from the wanted gap rather than from danger (Kesting, Treiber and Helbing 2010).
+//! After Kesting, Treiber and Helbing (2007). A driver changes lanes if its own gain in acceleration, and a part of
+//! both followers' gain or loss (`politeness`), is more than a threshold. The threshold is lower to the right than to
+//! the left. Accelerations are those of the Intelligent Driver Model before and after the change. A driver takes
+//! followers for drivers like itself. Only ambient vehicles change lanes so; commanded ones do what their verb says.
+//! For both a change must be safe (`change`). MOBIL's criterion, that no follower has to brake harder than `b_safe`, is
+//! kept by its kinematics. The model's own braking behind a vehicle that has just cut in comes from the wanted gap
+//! rather than from danger (Kesting, Treiber and Helbing 2010).
 
 use avastra_base::geometry::Path;
 use avastra_lang::model::vocabulary::Side;
@@ -118,11 +118,11 @@ impl Idm {
     }
 }
 
-/// What a change is worth to a driver at a speed, m/s²: its own gain, and the followers' by politeness.
+/// The incentive of a change for a driver at a speed, m/s²: its own gain, and the followers' by politeness.
 fn gain_mps2(driver: &Idm, speed_mps: f64, length_m: f64, own: Lane, beside: Lane, politeness: f64) -> f64 {
     let this = |gap_m| Some(Other { gap_m, speed_mps });
     let of = |leader| driver.acceleration_mps2(speed_mps, leader);
-    // What a follower gains when the vehicle before it is another one.
+    // The gain of a follower when another vehicle becomes its leader.
     let gain = |follower: Option<Other>, before: Option<Other>, after: Option<Other>| {
         follower.map_or(0.0, |follower| {
             let of = |leader| driver.acceleration_mps2(follower.speed_mps, leader);

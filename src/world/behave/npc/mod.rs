@@ -7,7 +7,7 @@
 //! | where it stops for a red or yellow light, or a sign | `stop_line` |
 //! | which vehicles it waits for at a junction, and for how long | `manners` |
 //! | when and how it changes lanes | `change`; for its own gain `mobil` |
-//! | how it does what an order or a phase tells it | to the side `aside`; at the next junction `turn`; beside the ego vehicle `pursuit`; its speed `driver` |
+//! | how it does what an order or a phase tells it | lateral orders `aside`, next junction `turn`, beside the ego vehicle `pursuit`, speed `driver` |
 //! | what it sees and does under the profile `released` | `rays` |
 
 mod aside;

@@ -1,6 +1,7 @@
-//! What drivers are told to do beside another one: to keep a gap to the ego vehicle or to a road user, ahead of it or behind it,
-//! or to be at a place so much before the ego vehicle. Both say the speed, from tick to tick, as OpenSCENARIO's continuous
-//! `LongitudinalDistanceAction` and its `SynchronizeAction` do. Lights, bends and others may still make a vehicle slower.
+//! Orders to drivers relative to another road user. Either a driver keeps a gap, ahead or behind, to the ego vehicle or
+//! to a road user. Or it reaches a place a set time before the ego vehicle. Both say the speed, from tick to tick, as
+//! OpenSCENARIO's continuous `LongitudinalDistanceAction` and its `SynchronizeAction` do. Lights, bends and others may
+//! still make a vehicle slower.
 
 use avastra_base::kinematics::{STANDING_MPS, braking_m, needed_mps2};
 
@@ -115,8 +116,8 @@ impl Driver {
         Some(wanted_mps2.min(mps2_max))
     }
 
-    /// How hard it must brake not to run into the one to whom it keeps a gap, m/s², if that one goes on braking as it does; `None`
-    /// if gentle braking will do, and of one that it ignores.
+    /// How hard it must brake not to run into the road user to which it keeps a gap, m/s², if that one goes on braking
+    /// as it does. `None` if gentle braking will do, or if it ignores that road user.
     pub fn braking_for_kept_mps2(&self, size: &BodyParameters, around: &Around) -> Option<f64> {
         let (kept, kept_mps2) = self.kept(around)?;
         let is_minded = |other: Other| core::ptr::eq(other.outline, kept.outline);

@@ -1,13 +1,13 @@
-//! What drivers of the profile `released` see, and how they change their speed: LGSVL's vehicles.
+//! Perception and speed control of drivers of the profile `released`, LGSVL's vehicles.
 //!
-//! Three rays run straight ahead from the front, from its middle and its corners, whatever the way does. What
-//! they meet within a stop distance makes the driver stop. The stop distance grows with the speed and falls
-//! with a driver's aggression, 1 to 3. The speed tends to its target at a fixed rate.
-//! Figures from `NPCLaneFollowBehaviour` of LGSVL's simulator 2021.3; they stand in `scene::traffic`.
+//! Three rays run straight ahead from the front, from its middle and its corners, whatever the way does. An obstacle
+//! that they meet within a stop distance makes the driver stop. The stop distance grows with the speed and falls with a
+//! driver's aggression, 1 to 3. The speed tends to its target at a fixed rate. Figures from `NPCLaneFollowBehaviour` of
+//! LGSVL's simulator 2021.3; they stand in `scene::traffic`.
 //!
-//! That rate is a wish of 23 to 57 m/s², which LGSVL's vehicles got because they have no tyres. Here brakes and
-//! tyres bound it (`Driver::step`), and so that its drivers are no worse for it, they stop from as far away as the
-//! brakes need, where that is more than the published distance.
+//! That rate is a wish of 23 to 57 m/s², which LGSVL's vehicles got because they have no tyres. Here brakes and tyres
+//! bound it (`Driver::step`). So that its drivers are no worse for it, they stop from as far away as the brakes need,
+//! where that is more than the published distance.
 
 use avastra_base::geometry::{Frame, Vec2};
 use avastra_base::kinematics::braking_m;
@@ -41,7 +41,7 @@ impl Driver {
         }
     }
 
-    /// What the rays meet within the stop distance.
+    /// The obstacle that the rays meet within the stop distance.
     pub fn ray_leader(&self, view: &View) -> Option<Leader> {
         let View { this, size, around } = *view;
         let profile = around.traffic;

@@ -11,8 +11,8 @@ use avastra_lang::model::body::BodyParameters;
 
 /// A driver passes a yellow light that would need harder braking than this, m/s².
 const YELLOW_BRAKING_MPS2: f64 = 3.0;
-/// A driver at rest with its front within this distance of the line of a sign has stopped at it, m: the gap at rest,
-/// and half a car's length for the last metres of an approach.
+/// A driver at rest with its front within this distance of the line of a sign has stopped at it, m. It is the gap at
+/// rest, and half a car's length for the last metres of an approach.
 const AT_LINE_M: f64 = GAP_M_MIN + 2.0;
 
 impl Driver {

@@ -38,8 +38,8 @@ impl Passage {
         self.in_m <= 0.0 && self.out_m > 0.0
     }
 
-    /// Whether this vehicle, still on its way to the area, can brake gently for the other, which is in it, or
-    /// need not brake at all.
+    /// Whether this vehicle, still on its way to the area, need not brake for the other, which is in it, or can brake
+    /// gently.
     fn has_time_for(&self, other: &Passage) -> bool {
         let clear_s = other.out_m / other.speed_mps.max(0.5) + CLEAR_S;
         let comes_s = self.in_m / self.speed_mps.max(0.5);
@@ -136,8 +136,8 @@ fn areas_ahead<'a>(around: &Around<'a>, to_m: f64) -> impl Iterator<Item = &'a R
     areas[first..last.max(first)].iter().filter(move |found| found.area.to_m > rear_m)
 }
 
-/// Who goes first on two lanes of a junction, those of the ego vehicle and of the other, by the lines that they passed and
-/// by the order of the lanes.
+/// The priority on two lanes of a junction, the ego vehicle's and the other's, by the lines that they passed and by the
+/// order of the lanes.
 fn by_rules(lanes: [LaneIndex; 2], passed: [&Passed; 2], around: &Around) -> (Priority, Rule) {
     let map = &around.scene.map;
     let [ego_red, other_red] = [0, 1].map(|nth| passed[nth].ran_light(lanes[nth], around));

@@ -15,31 +15,32 @@
 //! | one lane | a vehicle behind another keeps its distance | 13.5 |
 //!
 //! A vehicle is judged by its motion, whichever word told it so: a lane change, an offset, and a trajectory that lead
-//! the same way are judged alike. `Ruling` names the rule, its moment, and whose motion decided.
+//! the same way get the same verdict. `Ruling` names the rule, its moment, and whose motion decided.
 //!
-//! To give way means not to make the other change its speed or direction *abruptly* (article 1), so what counts
-//! is the moment when the first of the two comes into the other's way. A vehicle that then leaves the other
-//! room to brake gently has given way, and has from now on priority over it: a vehicle that is in a junction may clear
-//! it (18.6), and one that follows keeps its distance (13.5); that both make a priority is ours. What is abrupt,
-//! UN R79 says for lane changes: more than 3 m/s² after 0.4 s, to stay the way of a second behind. So a vehicle that
-//! cuts in and stops before the one behind it has its distance back, or could have stopped, has not given way. A vehicle that waits in a
-//! junction beside the other's way and then sets out comes anew. A vehicle that passed
-//! red, late yellow or its stop sign has not given way, however early it came. If that was the other vehicle, and the ego vehicle
-//! had time to brake, neither has priority.
+//! To give way means not to make the other change its speed or direction *abruptly* (article 1). So the moment counts
+//! when the first of the two comes into the other's way. A vehicle that then leaves the other room to brake gently has
+//! given way, and has from now on priority over it. A vehicle that is in a junction may clear it (18.6), and a vehicle
+//! that follows keeps its distance (13.5). That both make a priority is ours. UN R79 says for lane changes what is
+//! abrupt: more than 3 m/s² after 0.4 s, to stay the way of a second behind. So a vehicle that cuts in and stops before
+//! the one behind it has its distance back, or could have stopped, has not given way. A vehicle that waits in a
+//! junction beside the other's way and then sets out comes anew. A vehicle that passed red, late yellow or its stop
+//! sign has not given way, however early it came. If that was the other vehicle, and the ego vehicle had time to brake,
+//! neither has priority.
 //!
-//! A vehicle that stands has priority if the ego vehicle has seen it so while it could brake gently for it, or if it came with room,
-//! wherever it stands and looks (13.1). If it then moves by a step, neither has. An ego vehicle that stands has stopped already.
+//! A vehicle that stands has priority in two cases, wherever it stands and looks (13.1). Either the ego vehicle saw it
+//! stand while it could brake gently for it, or it came with room. If it then moves by a step, neither has. An ego
+//! vehicle that stands has stopped already.
 //!
 //! A vehicle that has crashed is an obstacle: whoever drives must be able to stop for what can be foreseen (13.1).
 //! It has priority, unless it came to lie in the ego vehicle's way too late to brake gently for it; then neither has.
 //!
-//! A pedestrian on a crosswalk has priority (21), unless the light for the ego vehicle is green. Elsewhere a
-//! pedestrian may not step onto the road without regard to distance and speed of what comes (20.6), and a
-//! driver must not endanger pedestrians and be able to stop for what can be foreseen (21.1, 13.1). So the ego
-//! vehicle has priority only over one that steps onto the carriageway too late for its brakes, and otherwise
-//! neither has. It loses that priority once it sees the pedestrian and could still stop, and it
-//! has none at walking pace, from which a driver can stop for any pedestrian. A pedestrian who stays beside the road has priority
-//! over an ego vehicle that leaves the road there.
+//! A pedestrian on a crosswalk has priority (21), unless the light for the ego vehicle is green. Elsewhere a pedestrian
+//! may not step onto the road without regard to distance and speed of approaching vehicles (20.6). A driver must not
+//! endanger pedestrians, and must be able to stop for what can be foreseen (21.1, 13.1). So the ego vehicle has
+//! priority only over one that steps onto the carriageway too late for its brakes, and otherwise neither has. It loses
+//! that priority once it sees the pedestrian and could still stop. It has none at walking pace, from which a driver can
+//! stop for any pedestrian. A pedestrian who stays beside the road has priority over an ego vehicle that leaves the
+//! road there.
 //!
 //! If two vehicles come towards each other outside junctions, the one beyond the middle of the road has to give way
 //! (articles 10.3 and 12). Any part of its body counts, such as the rear of a bus that swings over the line. If both are

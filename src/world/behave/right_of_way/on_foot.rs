@@ -55,8 +55,8 @@ impl Strip {
     }
 }
 
-/// Who has priority, the ego vehicle or a pedestrian, an animal or a thing that comes onto the carriageway or into its way
-/// now.
+/// The priority between the ego vehicle and a pedestrian, an animal or a thing that comes onto the carriageway or into
+/// its way now.
 pub fn on_foot(this: &Obstacle, strip: &Strip, around: &Around) -> Ruling {
     let ruling = |priority, rule, mover| Ruling { priority, rule, mover, time_s: around.time_s() };
     match whatever_the_room(this, strip, around) {
@@ -67,8 +67,8 @@ pub fn on_foot(this: &Obstacle, strip: &Strip, around: &Around) -> Ruling {
     }
 }
 
-/// The rule by which the ego vehicle gives way, however little room it has: to a person on a crosswalk, and to a body that stays
-/// beside the road where the ego vehicle leaves it.
+/// The rule by which the ego vehicle gives way, however little room it has. It does so to a person on a crosswalk, and
+/// to a body that stays beside the road where the ego vehicle leaves it.
 pub fn whatever_the_room(this: &Obstacle, strip: &Strip, around: &Around) -> Option<Rule> {
     let mut crosswalks = around.scene.route.crosswalks_m.iter().filter(|_| this.body != Body::Object);
     let at = |(from_m, to_m): &&(f64, f64)| (from_m - KERB_M..to_m + KERB_M).contains(&strip.station_m);
@@ -93,8 +93,9 @@ fn ego_leaves_road_to(this: &Obstacle, strip: &Strip, around: &Around) -> bool {
     ego.corners().iter().filter(is_there).any(|corner| is_off(*corner, &ego.pose, OVER_M))
 }
 
-/// The colour of the light that holds for a crosswalk of the route, which begins at a station; green if one of several is. Whoever drives
-/// straight on through a junction has the same light for the crosswalk behind it: people there wait.
+/// The colour of the light that holds for a crosswalk of the route, which begins at a station; green if one of several
+/// is. A driver that goes straight on through a junction has the same light for the crosswalk behind it: people there
+/// wait.
 pub fn light_before(crosswalk_m: f64, around: &Around) -> Option<SignalColour> {
     let (map, route) = (&around.scene.map, &around.scene.route);
     let before = || route.stop_lines.iter().filter(|line| line.station_m < crosswalk_m);

@@ -1,4 +1,4 @@
-//! Who goes first in a junction by lights, signs and the order of the lanes.
+//! Right of way in a junction by lights, signs and the order of the lanes.
 
 use avastra_lang::model::vocabulary::Priority;
 use avastra_road::{LaneIndex, RoadMap};
@@ -7,7 +7,7 @@ use crate::scene::junction::{Order, order};
 use crate::state::ruling::Rule;
 use crate::state::sensed::SignalColour;
 
-/// Who has priority where two lanes of a junction are in each other's way, with the lights as they are now.
+/// The priority where two lanes of a junction are in each other's way, with the lights as they are now.
 ///
 /// `ego` and `other` are the lanes inside the junction on which the two vehicles are or will be. A red light
 /// decides first; where both or neither have one, signs do, and then the lanes' own order (see `junction`).
@@ -23,7 +23,7 @@ pub fn right_of_way(
     by_lights(is_red(ego), is_red(other)).unwrap_or_else(|| by_order(map, ego, other)).0
 }
 
-/// Who goes first by their lights; `None` if both may go.
+/// The priority by the lights; `None` if both may go.
 pub fn by_lights(ego_red: bool, other_red: bool) -> Option<(Priority, Rule)> {
     match (ego_red, other_red) {
         (true, true) => Some((Priority::None, Rule::BothLights)),
@@ -33,7 +33,7 @@ pub fn by_lights(ego_red: bool, other_red: bool) -> Option<(Priority, Rule)> {
     }
 }
 
-/// Who goes first by signs and by the order of lanes.
+/// The priority by signs and by the order of lanes.
 pub fn by_order(map: &RoadMap, ego: LaneIndex, other: LaneIndex) -> (Priority, Rule) {
     let (ego_first, order) = order(map, ego, other);
     let rule = match order {

@@ -22,12 +22,12 @@ const STOOD_S: f64 = 5.0;
 const AT_LINE_M: f64 = 5.0;
 /// A front that reaches over the line of a stop sign by less has not passed it, m. Ours: a driver does not see a line under the bonnet.
 const OVER_LINE_M: f64 = 0.5;
-/// Of two that stood at their signs, one was first if it stood earlier by more than this, s. Ours.
+/// If two vehicles stood at their signs, the one that stood earlier by more than this was first, s. Ours.
 const FIRST_S: f64 = 1.0;
 
 impl Passed {
-    /// Notes the lines that lie between two stations of a front: lights, and stop signs with the lanes that they stand on,
-    /// these once the front is [`OVER_LINE_M`] beyond. `speed_mps`: of the vehicle.
+    /// Notes the lines that lie between two stations of a front: lights, and stop signs with the lanes that they stand
+    /// on. Stop signs are noted once the front is [`OVER_LINE_M`] beyond. `speed_mps`: of the vehicle.
     pub fn pass(
         &mut self,
         lights: &[StopLine],
@@ -137,7 +137,8 @@ impl Passed {
     }
 }
 
-/// Who goes first where both lanes have stop signs, or one of the vehicles ran its sign; `None` where that decides nothing.
+/// The priority where both lanes have stop signs, or one of the vehicles ran its sign; `None` where that decides
+/// nothing.
 pub fn by_stops(
     [ego, other]: [LaneIndex; 2],
     passed: [&Passed; 2],
@@ -159,7 +160,7 @@ pub fn by_stops(
     }
 }
 
-/// What a light shows a vehicle that passes it now.
+/// The colour that a light shows a vehicle that passes it now.
 fn shown(signal: usize, speed_mps: f64, around: &Around) -> Shown {
     let map = &around.scene.map;
     match around.colours[signal] {
@@ -310,10 +311,11 @@ mod tests {
         assert!(!passed.has_just_stood(&world.alone()));
     }
 
-    /// Of two at their signs the one goes first that came to stand at its line first, however long it waits and inches up.
+    /// The vehicle that first came to stand at its line goes first, however long it waits and inches up.
     #[test]
     fn a_stand_counts_from_its_beginning_at_the_line() {
-        // At so many metres before its line, it stands for 2 s; then it drives on, with another stand of 2 s if that is told.
+        // At so many metres before its line, it stands for 2 s. Then it drives on, with another stand of 2 s if that is
+        // told.
         let stood = |stands_m: &[f64]| {
             let mut world = World::new(testing::crossing(), &testing::start());
             let mut passed = Passed::default();

@@ -1,4 +1,4 @@
-//! What is noted of a road user and the ego vehicle, ten times a second, and what is read of it at a contact.
+//! Notes of a road user and the ego vehicle, made ten times a second, and read at a contact.
 
 use crate::behave::right_of_way::crossing::{Crossing, cuts_across};
 use crate::behave::right_of_way::on_foot::{Strip, on_foot, whatever_the_room};
@@ -30,7 +30,7 @@ impl Meeting {
     pub fn is_over(&self, side: &Side, time_s: f64) -> bool {
         match self.ruling.rule {
             Rule::Clearing => side.backs(self.ruling.mover),
-            // Of one that turns across another's way; they do not follow each other.
+            // One vehicle turns across the other's way; they do not follow each other.
             Rule::Overtaking | Rule::Siren => false,
             _ => side.is_gentle() || side.along > 0.0 && time_s > self.rests_s,
         }
@@ -80,7 +80,7 @@ impl Rights {
         vehicle.is_some_and(|vehicle| cuts_across(&vehicle, [ego_passed, &self.passed], around))
     }
 
-    /// Who had priority, now that the road user, which has crashed, and the ego vehicle touch.
+    /// The priority now that the road user, which has crashed, and the ego vehicle touch.
     pub fn at_contact_with_wreck(&self, this: &Obstacle, around: &Around) -> Ruling {
         // The ego vehicle came to where it stood, or it slid to where the ego vehicle drove.
         let stands = this.velocity_mps == Vec2::zeros();
@@ -137,7 +137,7 @@ impl Rights {
             self.foreseen = self.foreseen.filter(is_there);
             return;
         }
-        // What moves slowly, such as a door that opens, may stand in the way now and did not before.
+        // A slow body, such as a door that opens, may stand in the way now and did not before.
         let has_moved = |seen: &Foreseen| !seen.blocks && (at - seen.at).norm() > MOVED_M;
         if self.foreseen.is_some_and(|seen| has_moved(&seen)) {
             self.foreseen = None;
@@ -220,7 +220,7 @@ impl Rights {
             && (strip.aside_m < if walks { BESIDE_M } else { 0.0 } || walks && is_on_road());
         if shares {
             let known = self.meeting.filter(|_| self.shares == Some(true)).map(|meeting| meeting.ruling);
-            // What was found holds until such a rule begins, or until the ego vehicle is back on the road.
+            // The known ruling holds until such a rule begins, or until the ego vehicle is back on the road.
             let now = whatever_the_room(this, &strip, around);
             let is_other = |known: &Ruling| match now {
                 Some(rule) => known.rule != rule,

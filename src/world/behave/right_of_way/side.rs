@@ -15,7 +15,7 @@ use crate::view::around::Around;
 
 /// Way behind another vehicle that may not be cut off, s at its speed (UN R79, 5.6.4.7).
 const HEADWAY_S: f64 = 1.0;
-/// Vehicles with more room than this between them are not in each other's lane in any way that matters, m: one
+/// Vehicles with more room than this between them are not in each other's lane in any way that matters, m. A vehicle
 /// that is 16 m/s faster brakes at 3 m/s² after 0.4 s within 49 m.
 const LANE_M: f64 = 50.0;
 /// Farther to the side than this a vehicle is in no lane that matters, m.
@@ -56,7 +56,7 @@ pub struct Side {
     /// That of the ego vehicle, if it kept to the limit.
     pub allowed_mps: f64,
     pub other_mps: f64,
-    /// What each does that the other need not expect.
+    /// The manoeuvre of each that the other need not expect.
     pub ego_does: Option<Rule>,
     pub other_does: Option<Rule>,
     /// Whether the other is an emergency vehicle under way.
@@ -188,7 +188,7 @@ impl Side {
         does == Some(Rule::Backing)
     }
 
-    /// Who comes into the lane of the other: the one that has to give way.
+    /// Which vehicle comes into the lane of the other: it has to give way.
     pub fn comes(&self, time_s: f64) -> Option<Ruling> {
         let (priority, rule, mover) = match (self.ego_does, self.other_does) {
             (Some(_), Some(_)) => (Priority::None, Rule::BothLeaveLanes, Mover::Both),
@@ -202,8 +202,8 @@ impl Side {
         Some(Ruling { priority, rule, mover, time_s })
     }
 
-    /// Who has priority when one vehicle comes into the other's lane; `None` if it left enough room or came in behind, so that
-    /// the rule for following decides.
+    /// The priority when one vehicle comes into the other's lane. `None` if it left enough room or came in behind, so
+    /// that the rule for following decides.
     pub fn at_coming(&self, beyond_middle: impl FnOnce() -> Option<Ruling>, time_s: f64) -> Option<Ruling> {
         if self.is_oncoming() {
             return beyond_middle();
@@ -219,9 +219,9 @@ impl Side {
             Mover::Other | Mover::Both => Priority::Other,
         };
         match ruling.rule {
-            // Whoever came first: one that turns and one that passes it do not drive on behind each other.
+            // Whichever came first: a turning vehicle and a vehicle that passes it do not drive on behind each other.
             Rule::Overtaking | Rule::Siren => Some(ruling),
-            // Who turns off before the other does not drive on ahead of it: it clears the junction.
+            // A vehicle that turns off before the other does not drive on ahead of it: it clears the junction.
             Rule::TurningOff if self.can_stop_before() => {
                 Some(Ruling { priority: has_given_way, rule: Rule::Clearing, ..ruling })
             }
@@ -231,7 +231,7 @@ impl Side {
         }
     }
 
-    /// Who has priority in a contact of two that did not come abruptly into one lane.
+    /// The priority in a contact of two vehicles that did not come abruptly into one lane.
     pub fn at_contact(&self, beyond_middle: impl FnOnce() -> Option<Ruling>, time_s: f64) -> Option<Ruling> {
         let ruling = |priority, rule, mover| Ruling { priority, rule, mover, time_s };
         if self.is_oncoming() {
@@ -271,7 +271,8 @@ impl Side {
     }
 }
 
-/// What each does, the ego vehicle and the other, if the ego vehicle is at a junction and one turns off across the other's way.
+/// The manoeuvres of the ego vehicle and of the other, if the ego vehicle is at a junction and one turns off across the
+/// other's way.
 pub fn turns_off(vehicle: &Vehicle, around: &Around) -> Option<[Option<Rule>; 2]> {
     let (route, map) = (&around.scene.route, &around.scene.map);
     let (car, station_m) = (VehicleParameters::MKZ, around.ego_station_m);
@@ -287,7 +288,7 @@ pub fn turns_off(vehicle: &Vehicle, around: &Around) -> Option<[Option<Rule>; 2]
     Pair { map, route, inside, ego, ego_station_m: station_m, other, way }.does()
 }
 
-/// What a vehicle does.
+/// The conduct of one vehicle.
 struct Conduct<'a> {
     outline: &'a OrientedBox,
     forward: Vec2,
@@ -377,8 +378,8 @@ impl Conduct<'_> {
     }
 }
 
-/// Which of the two has priority because the other is beyond the middle of the road: with any corner, or otherwise at the
-/// point `at` where they touch. Neither has if both are beyond it; `None` if neither of them is.
+/// Which of the two has priority because the other is beyond the middle of the road. Any corner beyond it counts;
+/// otherwise the point `at` where they touch. Neither has if both are beyond it; `None` if neither of them is.
 pub fn beyond_middle(this: &Obstacle, around: &Around, at: Option<Vec2>) -> Option<Ruling> {
     let map = &around.scene.map;
     let told = |ego: bool, other: bool| {

@@ -232,10 +232,10 @@ fn one_who_cuts_in_and_stops_has_not_given_way_before_the_distance_is_back() {
     // As fast as the ego vehicle, less than a second before it.
     assert_eq!(coming(side(4.0, 10.0)), Some(Priority::Ego));
     assert_eq!(coming(side(11.0, 10.0)), None);
-    // What was found stays while it brakes to rest, and until there is room to brake gently for it.
+    // The ruling stays while it brakes to rest, and until there is room to brake gently for it.
     assert!(!side(4.0, 10.0).is_gentle() && !side(6.0, 5.0).is_gentle() && !side(4.0, 0.0).is_gentle());
     assert!(side(22.0, 0.0).is_gentle());
-    // Who is still as near once it could have stopped follows the other: 0.4 s, and 10 m/s at 3 m/s².
+    // A vehicle that is still as near once it could have stopped follows the other: 0.4 s, and 10 m/s at 3 m/s².
     let ruling = side(4.0, 10.0).at_coming(|| None, 0.0).expect("it cut in");
     let rests_s = side(4.0, 10.0).rests_in_s();
     let meeting = Meeting { rests_s, ..Meeting::new(Place::Lane, ruling, 0) };
@@ -254,7 +254,7 @@ fn others_need_not_leave_more_room_to_who_speeds() {
         ..SIDE
     };
     assert!(!side(20.0).is_gentle() && side(13.9).is_gentle());
-    // What counts is the speed of whoever is behind.
+    // The speed of the vehicle behind counts.
     assert!(Side { ego_is_ahead: true, other_mps: 20.0, ..side(13.9) }.is_gentle());
     let scene = testing::straight();
     let world = testing::world(&scene);
@@ -264,7 +264,8 @@ fn others_need_not_leave_more_room_to_who_speeds() {
     assert_eq!(allowed(limit_mps + 1.1), limit_mps);
 }
 
-/// Two in one direction, the ego vehicle 2 m behind, flank to flank by half a metre and at the same speed; neither leaves its lane.
+/// Two in one direction, the ego vehicle 2 m behind, flank to flank by half a metre and at the same speed. Neither
+/// leaves its lane.
 const SIDE: Side = Side {
     aside_m: -0.5,
     apart_m: 2.0,
@@ -363,7 +364,7 @@ fn who_comes_into_a_lane_gives_way_unless_it_comes_behind_or_leaves_room() {
     assert_eq!(told(Side { apart_m: -1.0, ego_is_ahead: true, ..other }), of_other);
     assert_eq!(told(Side { along: 0.0, ..ego }), of_ego, "across the other");
     assert_eq!(told(SIDE), None, "neither comes");
-    // Who turns off in good time clears the junction, where one that changes lanes drives on ahead.
+    // A vehicle that turns off in good time clears the junction, where a vehicle that changes lanes drives on ahead.
     let room = Side { apart_m: 40.0, ..SIDE };
     let by_rule = |side: Side| side.at_coming(|| None, 3.0).map(|of| (of.priority, of.rule, of.mover));
     let turns = Some(Rule::TurningOff);
@@ -445,7 +446,7 @@ fn who_stands_beside_the_road_did_not_come_to_an_ego_vehicle_that_leaves_it() {
     assert_eq!(met(2.6, 0.4), None);
 }
 
-/// What was found of a car that came out of a drive, when the two touch.
+/// The ruling on a car that came out of a drive, when the two touch.
 #[test]
 fn an_ego_vehicle_that_drives_gives_way_to_what_stands_and_one_that_stands_does_not() {
     let scene = testing::crossing();

@@ -1,7 +1,8 @@
 //! Two vehicles that come to a junction side by side, of which one turns off across the other's way (articles 11 and 16).
 //!
-//! A vehicle that turns off gives way to one that goes straight on beside it, on the road or on a path of its own. Where it turns
-//! across the road, the other may not overtake it on that side: in its lane, or in one for oncoming traffic.
+//! A vehicle that turns off gives way to a vehicle that goes straight on beside it, on the road or on a separate path.
+//! Where it turns across the road, the other may not overtake it on that side: in its lane, or in one for oncoming
+//! traffic.
 
 use avastra_base::geometry::{Path, Pose, Vec2, wrap_angle};
 use avastra_road::{RoadMap, Route, RouteLane};
@@ -38,7 +39,7 @@ pub struct Moving {
     pub velocity_mps: Vec2,
 }
 
-/// What a vehicle does in the junction.
+/// The motion of a vehicle in the junction.
 struct Turn {
     /// How far it turns there, rad to the left.
     turn_rad: f64,
@@ -50,8 +51,8 @@ struct Turn {
 }
 
 impl Pair<'_> {
-    /// What each does that the other need not expect, the ego vehicle and the other; `None` if neither turns off across the
-    /// other's way.
+    /// The manoeuvres that the other need not expect, the ego vehicle's and the other's; `None` if neither turns off
+    /// across the other's way.
     pub fn does(&self) -> Option<[Option<Rule>; 2]> {
         let (from_m, to_m) = self.junction_m();
         let entry = self.route.path.pose_at(from_m);
@@ -106,7 +107,7 @@ impl Pair<'_> {
         (first.unwrap_or(&self.inside).from_m, last.unwrap_or(&self.inside).to_m)
     }
 
-    /// Whether the passer overtakes a vehicle that turns across the road, where it has no lane or way of its own.
+    /// Whether the passer overtakes a vehicle that turns across the road, where the passer has no separate lane or way.
     fn is_overtaken(&self, entry: &Pose, turner: &Turn, passer: &Turn) -> bool {
         let turns_across = (turner.turn_rad > 0.0) != self.map.lane(self.inside.lane).keeps_left;
         let lane = |from_m: f64| {
@@ -134,7 +135,8 @@ impl Turn {
     }
 }
 
-/// How far a path turns on a stretch beyond what it turned before, rad to the left: who goes on round a circle does not turn.
+/// How far a path turns on a stretch beyond what it turned before, rad to the left: a vehicle that goes on round a
+/// circle does not turn.
 fn turns_rad(path: &Path, from_m: f64, length_m: f64) -> f64 {
     path.turned_rad(from_m, from_m + length_m) - path.turned_rad(from_m - length_m, from_m)
 }
@@ -148,8 +150,8 @@ mod tests {
     use crate::sim::tests::hold;
     use crate::state::ego::VehicleParameters;
 
-    /// What the two do when the ego vehicle's front is 8 m inside the junction. The other is on a way through these places, at a
-    /// station of it, and goes along it at 5 m/s.
+    /// The manoeuvres of the two when the ego vehicle's front is 8 m inside the junction. The other is on a way through
+    /// these places, at a station of it, and goes along it at 5 m/s.
     fn told(heading: Heading, way: &[[f64; 2]], station_m: f64) -> Option<[Option<Rule>; 2]> {
         let scene = testing::oncoming(heading);
         let mut world = testing::world(&scene);
@@ -176,9 +178,9 @@ mod tests {
         // The ego vehicle turns left from y = -1.75: one passes it on the other side of the road, one on the right.
         assert_eq!(told(Heading::Left, &along(1.5), 75.0), Some([None, Some(Rule::Overtaking)]));
         assert_eq!(told(Heading::Left, &along(-5.0), 75.0), None);
-        // On a way of its own beside the road, it passes.
+        // On a separate way beside the road, it passes.
         assert_eq!(told(Heading::Left, &along(5.0), 75.0), Some([Some(Rule::TurningOff), None]));
-        // One that turns left, too, is in nobody's way.
+        // A vehicle that also turns left is in no other's way.
         let also = [[-80.0, 1.5], [-6.0, 1.5], [-3.0, 4.0], [-2.0, 40.0]];
         assert_eq!(told(Heading::Left, &also, 60.0), None);
         // It goes straight on, and one beside it turns off: right across its way, or left and away.

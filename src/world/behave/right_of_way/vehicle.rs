@@ -80,8 +80,8 @@ impl<'a> Vehicle<'a> {
         lane.is_some_and(|lane| map.lane(lane).junction.is_some())
     }
 
-    /// From the front to the beginning of its stretch of a conflict area, and from the rear to the end of it, m; `None` if
-    /// it does not go through it.
+    /// From the front to the beginning of its stretch of a conflict area, and from the rear to that stretch's end, m.
+    /// `None` if it does not go through the area.
     pub fn through(&self, area: &Area, around: &Around) -> Option<(f64, f64)> {
         let half_m = self.this.outline.half_length_m;
         let (station_m, begin_m) = match self.way {

@@ -1,4 +1,4 @@
-//! What road users are told to do beside the ego vehicle and along its route, against closed forms.
+//! Orders to road users beside the ego vehicle and along its route, against closed forms.
 
 use std::sync::Arc;
 

@@ -25,7 +25,7 @@ use super::story::{Cast, Newcomer};
 use super::{Ego, Version, destination, file_header, property, staged};
 use template::Template;
 
-/// What drawn values are drawn from: a file has one value of each.
+/// The seed of drawn values: a file has one value of each.
 const SEED: u64 = 0;
 
 /// The fact of a file that holds the speed limit of the ego vehicle's road, m/s.

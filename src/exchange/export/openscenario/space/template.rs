@@ -14,7 +14,7 @@ pub struct Template {
     pub variations: Option<String>,
 }
 
-/// Whose the facts of a file are.
+/// The owner of the facts in a file's header.
 const HEADER: &str = "road";
 
 /// A parameter: its name, its type, and its value in each file.
@@ -39,7 +39,7 @@ pub fn of(rows: &[RowFile], file: &str) -> Template {
             given.push(None);
             continue;
         }
-        // What has the values of another one follows from it; but a fact of the header is one of its own.
+        // An attribute with the values of a known parameter uses that one; but a fact of the header has a separate one.
         let is_same = |known: &&Parameter| {
             known.kind == place.kind
                 && known.owner != HEADER
@@ -80,7 +80,7 @@ pub fn of(rows: &[RowFile], file: &str) -> Template {
 struct Attribute<'e> {
     /// The entity that it is about.
     owner: String,
-    /// What it is, in a word.
+    /// Its meaning, in a word.
     word: &'static str,
     /// Its type in OpenSCENARIO.
     kind: &'static str,
@@ -114,7 +114,7 @@ fn note<'e>(element: &'e Element, owner: &str, found: &mut Vec<Attribute<'e>>) {
     element.children().iter().for_each(|child| note(child, owner, found));
 }
 
-/// What an attribute is called as a parameter.
+/// The name of an attribute as a parameter.
 fn word(element: &str, attribute: &'static str) -> &'static str {
     match (element, attribute) {
         ("Property", "value") => "speed_limit",

@@ -71,7 +71,7 @@ pub(super) enum Rule {
     Fog([[bool; 3]; 3]),
 }
 
-/// What every step does at its end.
+/// The change that every step makes at its end.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum EachStep {
     Nothing,

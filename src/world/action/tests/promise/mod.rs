@@ -1,12 +1,13 @@
 //! The promise, audited by drawing: random spaces with rules of every form, judged by a twin that shares no code with
-//! the language. From the first moment on no rule is broken, what the checker calls realisable is drawn, and what it
-//! calls dead or out of reach is not. Nor do values that no draw finds run where a row is dead; a rule that is called
-//! idle or implied refuses nothing; and every witness runs.
+//! the language. From the first moment on no rule is broken. Rows that the checker calls realisable are drawn. Rows
+//! that it calls dead or out of reach are not. Where a row is dead, values that no draw finds do not run either. A rule
+//! that is called idle or implied refuses nothing. Every witness runs.
 //!
-//! At first this audit did not see that time alone may break a rule: its rules asked for no time, only draws were
-//! judged, and a step without an action was played only where every step does something. Now rules ask for `step` and
-//! `elapsed`, every kind of space has such steps and whole episodes of them, and the states are judged after each. What
-//! the checker says of rows for which an episode is too short is asked too: episodes end where those of the space do.
+//! At first this audit did not see that time alone may break a rule. Its rules asked for no time, and only draws were
+//! judged. A step without an action was played only where every step changes the state. Now rules ask for `step` and
+//! `elapsed`. Every kind of space has such steps and whole episodes of them, and the states are judged after each. The
+//! audit also tests the checker's verdict on rows for which an episode is too short: episodes end where those of the
+//! space do.
 
 mod made;
 
@@ -29,7 +30,7 @@ const DRAWS_MAX: u32 = 10_000;
 /// Steps of an episode.
 pub(super) const STEPS: u64 = 12;
 
-/// What a rule may ask about, as the twin knows it.
+/// The facts that a rule may ask about, as the twin knows them.
 #[derive(Clone)]
 struct Twin {
     road: usize,
@@ -143,7 +144,7 @@ impl Twin {
         (self.fog, self.wet, self.was, self.flag, self.count)
     }
 
-    /// What every step does after its action.
+    /// Makes the change of every step, after its action.
     fn end_step(&mut self, each_step: EachStep) {
         match each_step {
             EachStep::Nothing => {}
@@ -167,7 +168,7 @@ impl Twin {
         if made.rules.iter().any(breaks) { self.clone() } else { after }
     }
 
-    /// What a draw does, by what the action of that name says.
+    /// The state after a draw, by what the action of that name says.
     fn after(&self, space: &Space, row: &Row, draw: &Draw, each_step: EachStep) -> Twin {
         let axis = |name: &str| row.axes.iter().find(|(known, _)| &**known == name).map(|(_, value)| *value);
         let drawn =
@@ -219,7 +220,7 @@ impl Twin {
     }
 }
 
-/// What an audit saw.
+/// The findings of an audit.
 #[derive(Debug, Default)]
 struct Seen {
     spaces: u32,
