@@ -234,7 +234,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
 /// rights, its owner and its further names. A pipe, a terminal or the null device is written to and not replaced.
 ///
 /// # Errors
-/// As [`write`], and if the file that is there is read-only.
+/// As [`write()`], and if the file that is there is read-only.
 pub fn write_named(path: &Path, bytes: &[u8]) -> Result<()> {
     match std::fs::metadata(path) {
         Ok(found) if found.is_file() => return write_over(&std::fs::canonicalize(path)?, &found, bytes),

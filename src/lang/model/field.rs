@@ -1,7 +1,7 @@
 //! The fields of a `spawn`, an `order` and a phase of a manoeuvre: one table for all three.
 //!
 //! A field is a word of [`Field`] with its sentence, an arm of [`Field::kind`], which says what may be written there, and a
-//! line of [`getters!`], by which the world reads it. To check, prove, evaluate, compare, print and complete fields are
+//! line of `getters!`, by which the world reads it. To check, prove, evaluate, compare, print and complete fields are
 //! loops over this table.
 
 use core::array;

@@ -17,7 +17,7 @@ pub struct PolicyRule {
 /// `ego_speed > 8.25 m/s`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Condition {
-    /// Index in [`VARIABLES`].
+    /// Index in `VARIABLES`.
     pub variable: usize,
     pub comparison: Comparison,
     /// In the variable's own unit; for a word, the number that stands for it.
