@@ -1,4 +1,4 @@
-//! Numbers, units, texts and geometry for all other crates. This crate knows no roads and no vehicles.
+//! Numbers, units, chance, texts and geometry for all other crates. This crate knows no roads and no vehicles.
 //!
 //! - [`outside`]: texts from outside, and one function for each place where they may stand.
 //! - [`threads`]: work on as many threads as the system gives, with results in order.

@@ -11,7 +11,7 @@ use rand::SeedableRng;
 /// The one generator of avastra.
 pub type Rng = rand_chacha::ChaCha8Rng;
 
-/// The consumer of a stream. The discriminant is part of every replay: never renumber, only add.
+/// The purpose of a stream. The discriminant is part of every replay: never renumber, only add.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Stream {

@@ -6,7 +6,7 @@
 //! - A folder of ours inside a directory is used only if it is a folder and no link.
 //! - A name that a database or a file gives must be a [`PlainName`]; otherwise the database or the file is refused.
 //! - Where the user named a place to read, nothing is written beside it or in it if a folder on the way there is a link
-//!   ([`without_links`]). The user did not name a path that leads out of a clone as a place to write.
+//!   ([`without_links`]). A place outside a clone, to which a link in it leads, was not named as a place to write.
 //!
 //! Only a path that the user named to be written (`--out`, `--resume`) is followed wherever it leads ([`write_named`], [`make`]).
 //! A file that is to be changed (`fmt`, `check --fix`) is between the two: it may be a link itself, on the way to it there is none.

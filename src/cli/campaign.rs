@@ -65,7 +65,7 @@ pub trait Campaign: Serialize + DeserializeOwned {
     const KIND: Kind;
     type Database: Units;
 
-    /// The files outside of the directory that the settings name.
+    /// The space, the external driving system and the policy that the settings name outside of their directory.
     fn outside(&mut self) -> Outside<'_>;
 
     /// These settings; for a dry run with an external driving system that is not started.
@@ -75,7 +75,7 @@ pub trait Campaign: Serialize + DeserializeOwned {
     }
 }
 
-/// The files outside of their directory that settings name, by paths from there.
+/// The space, the external driving system and the policy that settings name outside of their directory, by paths from there.
 pub struct Outside<'a> {
     pub space: &'a mut String,
     pub space_digest: &'a str,

@@ -29,7 +29,7 @@ struct Line {
 }
 
 impl Times {
-    /// The times in a study's directory. A line that cannot be read is a time that is not known.
+    /// The times in a study's directory. A file or line that cannot be read gives no times: they are not known.
     pub fn read(directory: &Path) -> Times {
         let text = load::read(&directory.join(FILE)).unwrap_or_default();
         let lines = text.lines().filter_map(|line| serde_json::from_str::<Line>(line).ok());

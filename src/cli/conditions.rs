@@ -46,8 +46,8 @@ pub fn ambient_text(run: &Run) -> Option<String> {
     })
 }
 
-/// The changes in the driving system's profile, for a heading; empty if it is the default. The settings have the profile, so
-/// a resumed command says it, too.
+/// The changes that the driving system's profile makes, for a heading; empty if the profile is the default. The settings
+/// have the profile, so a resumed command says the changes, too.
 pub fn profile_text(profile: Option<&Profile>) -> String {
     let line = profile.map(|profile| profile.settings.to_line());
     line.filter(|line| !line.is_empty()).map_or_else(String::new, |line| format!(" with {line}"))

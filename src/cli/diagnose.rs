@@ -398,8 +398,8 @@ fn mended_text(cause: &[Module], changed: &str, noun: &str) -> String {
     format!("with {one} {changed} there is no {noun}, and the replays do not tell them apart")
 }
 
-/// Says which modules at fault crash without any errors as well. For them, the collision depends on how the module errs, and
-/// not on how much.
+/// Says which of the modules that crash by their difference from the baseline crash without any errors as well. With such a
+/// module, the collision depends on how the module errs, and not on how much.
 fn perfect_text(evidence: &Evidence, cause: &[Module]) -> String {
     let crashes = |found: &&ModuleFinding| matches!(found.idealised, Fate::Same | Fate::Other);
     let found = evidence.modules.iter().filter(|found| cause.contains(&found.module)).filter(crashes);

@@ -94,7 +94,7 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
 struct Exported {
     file: PathBuf,
     written: Result<Vec<PathBuf>, String>,
-    /// The parts of the scenario that its format cannot express.
+    /// The parts of the scenario that its file leaves out, or has otherwise than asked for.
     left_out: Vec<String>,
     /// The written actions that do not happen.
     refused: Vec<String>,

@@ -23,8 +23,8 @@ const FOLDER: &str = "imported";
 /// Files of a folder of catalogues that are read at most.
 const CATALOGUES_MAX: usize = 100;
 
-/// Writes every file's space, with its maps beside it. If the language cannot express a part, the part is listed and nothing
-/// is written.
+/// Writes every file's space, with its maps beside it. A part that the language cannot express is listed, and nothing is
+/// written for its file.
 pub fn import(output: &Output, arguments: &ImportArguments) -> Result<(), Failure> {
     let targets = targets(arguments)?;
     let parameters = parameters(arguments)?;

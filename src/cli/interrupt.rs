@@ -1,5 +1,5 @@
-//! Ctrl-C and SIGTERM. The first signal ends a resumable command after the episodes under way. For other commands, and the
-//! second time, everything ends at once, external driving systems included.
+//! Ctrl-C and SIGTERM. The first signal ends a command that can be resumed, or that plays several files, after the episodes
+//! under way. For other commands, and the second time, everything ends at once, external driving systems included.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};

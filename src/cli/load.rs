@@ -494,7 +494,7 @@ pub fn read_used(path: &Path) -> Result<String, ReadError> {
 }
 
 /// Reads a file that another file names. The naming file may be untrusted, so only files of the given kinds are read and
-/// shown in a diagnostic. The extension must match, and so must the extension of the file at the end of a link.
+/// shown in a diagnostic. The extension must match: for a link, that of the file at its end.
 pub fn read_named(path: &Path, extensions: &[&str], what_else: &str) -> Result<String, ReadError> {
     let followed = path.canonicalize().map_err(|error| {
         let meant = beside(path).map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));

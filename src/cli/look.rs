@@ -3,7 +3,8 @@
 //! A run, a training and an estimate keep a copy of their space. A scenario whose space has changed is played in that copy,
 //! as it was recorded. Without a copy it is played in the present space, and the digest of its trace tells whether that is
 //! the recorded episode. Either way a banner says what has changed, and how to bring the scenario along. `test`, `shrink`,
-//! `diagnose` and `export` judge by the space or pass it on. They refuse a changed space, and say where its copy is.
+//! `diagnose` and `export` judge by the space or pass it on. They refuse a scenario whose space has changed, and say where
+//! the copy of the space is.
 
 use std::path::{Path, PathBuf};
 

@@ -2,12 +2,12 @@
 //!
 //! The units of all shards are taken over into one database, whichever shard has them, with the scenarios that were written
 //! of them. Their texts are in the database, so their files may be edited or gone. The result is a directory in which all is
-//! played. The command itself ends it: it settles the database and writes the results. There is no second writer, and
-//! the bytes are the same as in the unsharded directory.
+//! played. It is ended by the code of `run`, `study` or `estimate`, which settles the database and writes the results.
+//! There is no second writer, so the bytes are the same as in the unsharded directory.
 //!
 //! Shards may have been copied from where they were played. Their settings name files outside of them, the space above all.
-//! Each file is looked for at its path, and else by the end of its path, from the working directory and the folders above.
-//! Any file that means the same serves.
+//! Each file is looked for at its path, and else by the end of its path, from the working directory, the shard's directory
+//! and the folders above them. Any file that means the same serves.
 //!
 //! Until it is whole, the directory has the name `OUT.partial`. It gets its own name only if its space still means what it
 //! meant; then it is ended. A merge that was killed in between is ended by the next one. Two merges into one directory are kept
@@ -62,7 +62,7 @@ pub fn merge(output: &Output, arguments: &MergeArguments) -> Result<(), Failure>
     }
 }
 
-/// The files outside of the shards that their settings name.
+/// The files that the settings of all shards name outside of them.
 struct Outside {
     space: PathBuf,
     policy: Option<PathBuf>,

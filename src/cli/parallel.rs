@@ -16,7 +16,7 @@ use super::output::{Output, plural};
 use super::progress::{Pieces, Working};
 
 /// Worker threads: as many as asked for, or one for each core. A driving system behind a socket may serve one connection
-/// at a time, so its default is one thread. Every driving system must show that it serves as many as there are threads.
+/// at a time, so its default is one thread. Behind a socket it must also show that it serves a connection for each thread.
 pub fn jobs(asked: Option<u32>, program: Option<&Arc<Program>>) -> Result<usize, Failure> {
     let cores = || match program {
         Some(program) if program.settings().command.is_socket() => 1,
@@ -78,7 +78,7 @@ fn hand_on<T>(
 }
 
 /// Does `work` for every file on as many threads as [`jobs`] says, for `program` if one is to drive. With several files, it
-/// says which failed. After Ctrl-C, files under way are ended, and it says which are not done.
+/// says which failed. After Ctrl-C, the files under way are finished, and it says which files are not done.
 pub fn each_file<T: Send>(
     output: &Output,
     many: &FilesArguments,

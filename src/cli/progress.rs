@@ -19,7 +19,7 @@ use super::output::{Output, Telling, plural, remark};
 pub struct Progress {
     count: Count,
     found: usize,
-    /// The words behind the number of collisions: `counted`, for example.
+    /// The word after the number of collisions, which says what kind is told: `counted`, for example.
     how: &'static str,
 }
 

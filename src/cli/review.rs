@@ -1,7 +1,7 @@
 //! Compares a scenario's claims about its world with the present. The space, the engine and the driving system may have
 //! changed since it was written. It is played again as they are now, each difference is said in words, and an updated text
-//! is made. Only differing parts of the file are replaced: digests, the driving system, and claims that do not hold any
-//! more. Claims that an author took out stay out.
+//! is made. Only differing parts of the file are replaced: digests, the engine, the driving system, and claims that do not
+//! hold any more. Claims that an author took out stay out.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -51,7 +51,7 @@ impl Change {
     }
 }
 
-/// The result of playing a scenario with the present space, engine and driving system.
+/// The result of playing a scenario as things are now.
 pub struct Review {
     pub change: Change,
     /// Each difference in words.

@@ -237,7 +237,7 @@ enum Copied {
 fn copied(directory: &Path, space: &str, digest: &str) -> Copied {
     let folder = directory.join(pack::SPACE);
     let space = Path::new(space);
-    // The run plays the copy itself, which is compared whenever it is read.
+    // The campaign plays the copy itself, which is compared whenever it is read.
     let is_inside = space.is_relative() && !space.starts_with("..");
     if is_inside {
         return Copied::Sound;

@@ -330,7 +330,7 @@ fn counted(count: f64, noun: &str) -> String {
 }
 
 /// Number of claims of a written file that do not hold. An external driving system plays the file by its recorded answers,
-/// as in any replay. The driving system `given` tries the claims that the answers do not cover.
+/// as in a replay without `--ads`. The driving system `given` plays whatever the answers do not cover.
 fn refuted(output: &Output, path: &Path, given: &Selected) -> Result<usize, Failure> {
     let (table, scenario) = load::scenario(output, path)?;
     let recorded = run::recorded(&scenario)?;

@@ -93,7 +93,7 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
             let study = Study::new(table, settings.started_unless(arguments.shard.dry_run))
                 .map_err(|error| Failure::file("use", file, error))?;
             if arguments.shard.dry_run {
-                // Cells of a driving system that was not started cannot be compared, but they can be read.
+                // The driving system is not started, so its earlier cells cannot be compared, but they can be read.
                 arguments.reuse.iter().try_for_each(|directory| read(directory).map(drop))?;
                 let costs = costs(&study.settings().work());
                 let episodes = plural(costs.iter().sum::<u64>() as usize, "episode");

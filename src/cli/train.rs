@@ -308,7 +308,7 @@ fn find_recurrence(output: &Output, training: &Training, directory: &mut Directo
         let examples = written.iter().filter(|one| next.contains(&one.unit)).cloned();
         let files = run_directory::written(&directory.path, examples.collect());
         done.extend(next);
-        // A scenario that is edited or gone belongs to the user.
+        // A scenario that the user edited or removed is left so.
         for (path, _) in files.iter().filter(|file| !run_directory::is_edited(file) && file.0.is_file()) {
             let (table, scenario) = load::scenario(&Output::silent(), path)?;
             let (stage, ads) = (Stage::new(&table, &scenario)?, training.arena().ads());

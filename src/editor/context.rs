@@ -5,8 +5,8 @@ use avastra_base::units::Dimension;
 use avastra_lang::check::{Declaration, References, Symbol};
 use avastra_lang::model::Type;
 use avastra_lang::model::vocabulary::{
-    BREACHED, BodyClass, CHANGE, EpisodeField, Fact, Field as Told, KEPT, Known, LIGHT, LightField, MARGIN,
-    PointField, RECURRENCE, ROAD_USER, RoadField, SINCE, ScenarioClaim, Site, SpaceClaim, StartField,
+    BREACHED, BodyClass, CHANGE, EpisodeField, Fact, Field as ToldField, KEPT, Known, LIGHT, LightField,
+    MARGIN, PointField, RECURRENCE, ROAD_USER, RoadField, SINCE, ScenarioClaim, Site, SpaceClaim, StartField,
     StopReason, THERE, TrajectoryField, WAIT, Word, parts_of, parts_of_named, things,
 };
 use avastra_lang::syntax::ast::{
@@ -288,7 +288,7 @@ impl<'a> Place<'a> {
                 self.word_or_value(words, &field.value, None)
             }),
             EffectKind::Order { fields, .. } => fields.iter().find_map(|field| match is_here(&field.name) {
-                true => Some(unused(fields, &Told::of_orders())),
+                true => Some(unused(fields, &ToldField::of_orders())),
                 false => self.in_command(field),
             }),
             EffectKind::Spawn(spawn) if spawn.of.as_ref().is_some_and(is_here) => Some(self.road_users()),
@@ -326,7 +326,7 @@ impl<'a> Place<'a> {
         ];
         let clause = |(clause, ty): (&Option<Expr>, Option<Type>)| self.within(clause.as_ref()?, ty, ty);
         let of_field = |field: &Field| match is_here(&field.name) {
-            true => Some(unused(&phase.fields, &Told::of_orders())),
+            true => Some(unused(&phase.fields, &ToldField::of_orders())),
             false => self.in_command(field),
         };
         clauses.into_iter().find_map(clause).or_else(|| phase.fields.iter().find_map(of_field))
@@ -334,9 +334,9 @@ impl<'a> Place<'a> {
 
     /// In the value of a field of an order or a phase.
     fn in_command(&self, field: &Field) -> Option<Vec<Kind>> {
-        match Told::from_name(&field.name.text) {
-            Some(Told::Then) => self.word_or_value(Kind::Manoeuvres, &field.value, None),
-            Some(Told::To) => self.word_or_value(Kind::RoadUsers, &field.value, None),
+        match ToldField::from_name(&field.name.text) {
+            Some(ToldField::Then) => self.word_or_value(Kind::Manoeuvres, &field.value, None),
+            Some(ToldField::To) => self.word_or_value(Kind::RoadUsers, &field.value, None),
             _ => {
                 let words = Kind::Words(words::engine_words(&field.name.text));
                 self.word_or_value(words, &field.value, None)
@@ -347,7 +347,7 @@ impl<'a> Place<'a> {
     fn in_spawn(&self, fields: &[Field]) -> Option<Vec<Kind>> {
         fields.iter().find_map(|field| {
             if is_here(&field.name) {
-                return Some(unused(fields, &Told::of_spawns()));
+                return Some(unused(fields, &ToldField::of_spawns()));
             }
             let words = Kind::Words(words::engine_words(&field.name.text));
             self.word_or_value(words, &field.value, None)

@@ -5,8 +5,8 @@
 //! function of an analysis and a byte; questions that reach into other files take the workspace. No name is resolved
 //! here. Places are lines and UTF-16 columns, as all editors count.
 //!
-//! Nothing here reads a file, knows a protocol, or has a clock. The caller reads files through [`Files`], and `cli/lsp`
-//! translates questions and answers to the Language Server Protocol.
+//! Nothing here reads a file, knows a protocol, or has a clock. The caller reads files for this crate ([`Files`]), and
+//! `cli/lsp` translates questions and answers to the Language Server Protocol.
 //!
 //! ```
 //! use std::path::{Path, PathBuf};

@@ -11,7 +11,7 @@ use super::outline::{self, OutlineKind};
 use super::position::{Lines, Place, Range};
 use super::workspace::{Analysis, Workspace};
 
-/// Most symbols that a search lists.
+/// Symbols that a search lists, at most: nobody reads more.
 const FOUND_MAX: usize = 256;
 
 /// The first and the last line of what an editor can fold away, from 0.

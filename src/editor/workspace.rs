@@ -181,7 +181,7 @@ impl Analysis {
     /// The document itself.
     pub const ROOT: FileId = FileId(0);
 
-    /// The declaration that each name stands for.
+    /// The symbols that each name stands for.
     pub fn references(&self) -> &References {
         &self.loaded.references
     }

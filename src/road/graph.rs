@@ -44,8 +44,8 @@ const STRAIGHT_RAD_MAX: f64 = 30.0 * core::f64::consts::PI / 180.0;
 /// Above this change of heading a connection is a U-turn (survey conventions).
 const U_TURN_RAD_MIN: f64 = 150.0 * core::f64::consts::PI / 180.0;
 
-/// A turn by more than this, with a smaller mean radius (m), is left out. It leads back into the next lane beside,
-/// which no car can drive in one go (between kerbs they need 10 to 12 m).
+/// A turn by more than this, with a smaller mean radius (m), is left out: it leads back into the next lane beside,
+/// and no car can drive it in one go (between kerbs, cars need 10 to 12 m).
 const TIGHT_RAD_MIN: f64 = 100.0 * core::f64::consts::PI / 180.0;
 const TIGHT_M_MIN: f64 = 3.0;
 

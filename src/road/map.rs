@@ -46,7 +46,7 @@ pub struct Lane {
     pub speed_limit_mps: f64,
     /// Whether the map states it; without a limit 50 km/h is taken.
     pub states_limit: bool,
-    /// Whether its road is a motorway, from which pedestrians are banned.
+    /// Whether its road is a motorway, on which nobody goes on foot.
     pub is_motorway: bool,
     /// Whether it is a bus lane.
     pub for_buses: bool,
@@ -216,7 +216,7 @@ pub struct Obstacle {
     pub place: LanePlace,
 }
 
-/// A building, a wall or a tree, which pedestrians do not walk through.
+/// Something solid, such as a building, a wall or a tree: nobody walks through it.
 #[derive(Debug, Clone)]
 pub struct Solid {
     /// Corners, in order.
@@ -354,8 +354,8 @@ impl RoadMap {
         Ok(LanePlace { lane: LaneIndex(index), station_m: candidate.station_of(s_m), offset_m: 0.0 })
     }
 
-    /// The middle of a lane where pedestrians may be but no vehicle drives, in its direction, at a station of the road's
-    /// reference line, and whether that is the line's direction; `None` if there is none.
+    /// The middle of a strip, a lane along which no car drives but people may be, in its direction, at a station of the
+    /// road's reference line, and whether that is the line's direction; `None` if there is no such strip.
     pub fn strip_pose(&self, road: &str, lane: i32, s_m: f64) -> Option<(Pose, bool)> {
         let holds = |strip: &&Strip| {
             let (first_m, last_m) = ends(&strip.road_stations_m);

@@ -126,7 +126,7 @@ impl Route {
     /// The cheapest way along successors and, with lane changes, along neighbours.
     ///
     /// A lane change costs as much as a detour of 100 m and is made only outside junctions, where markings
-    /// permit it and a stretch is long enough. At least half of the comfortable length is long enough.
+    /// permit it on a stretch that is long enough: at least half of the comfortable length.
     ///
     /// # Errors
     /// If the goal cannot be reached.

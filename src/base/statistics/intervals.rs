@@ -113,8 +113,8 @@ pub fn binomial_missing(count: u64, trials: u64, missing: f64) -> Interval {
 
 /// The interval of a mean of values of at least 0, most of which are 0 and the others of different weight (Fay and Feuer
 /// 1997). Its ends are gamma quantiles with the mean and its variance, for the upper end as if the heaviest value had come
-/// once more. `heaviest` is the share of the mean that this value has. It misses the mean in at most the given share of
-/// samples as far as no value is heavier.
+/// once more. `heaviest` is the share of the mean that this value has. The interval misses the mean in at most the given
+/// share of samples as far as no value is heavier.
 pub fn weighted(mean: f64, variance: f64, heaviest: f64, missing: f64) -> Interval {
     let tail = missing / 2.0;
     let low = if mean > 0.0 && variance > 0.0 {

@@ -45,9 +45,9 @@ const CORNER_M: f64 = 1e-3;
 
 /// Whether the obstacle ran into the ego vehicle rather than the other way round, whoever had to give way.
 ///
-/// A standing obstacle runs into nothing, so this is false for it. Otherwise it is true if the ego vehicle stood or was hit
-/// at the rear. It is true at the side behind the front axle, and before the axle if the obstacle moved towards that side.
-/// At a front corner it is true if the obstacle moved sideways onto the ego vehicle faster than the ego vehicle drove.
+/// A standing obstacle runs into nothing, so this is false for it. Otherwise it is true in each of these cases. The ego
+/// vehicle stood. It was hit at the rear. It was hit at the side behind its front axle, or before that axle by an obstacle
+/// moving towards that side. It was hit at a front corner by an obstacle that moved sideways onto it faster than it drove.
 pub fn struck(contact: &Contact, ego: &VehicleParameters) -> bool {
     if contact.obstacle_velocity_mps.norm() < STANDING_MPS {
         return false;

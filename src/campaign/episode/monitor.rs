@@ -2,7 +2,7 @@
 //!
 //! A requirement with `within D` is breached at a tick if its condition failed at every tick of the D before it and at
 //! itself; its margin there is the largest one of these ticks. One unbroken stretch of such ticks is one breach. Nothing
-//! is asked where `when` does not hold. A requirement that has been asked for less than D cannot be breached yet. A
+//! is asked where `when` does not hold. As long as a requirement is asked only since less than D, it cannot be breached. A
 //! requirement `on` bodies is asked of each road user near, and all of this holds for each of them by itself. A requirement
 //! with `after` is breached D after that began to hold, if its condition failed at every tick from then on: a breach of
 //! that tick. Its margin is the largest one of these ticks.
@@ -56,14 +56,14 @@ pub struct Margin {
 #[derive(Debug, Clone)]
 pub(super) struct Monitor {
     watched: Watched,
-    /// The places of all road users, if they are asked for.
+    /// The past places of the ego vehicle and of all other road users, if a requirement asks for them.
     encroachment: Option<Encroachment>,
     /// The facts of the moment, filled anew at every tick.
     facts: WorldFacts,
     watches: Vec<Watch>,
     /// The requirements that nothing is asked of on this road, by index in `Space::requirements`.
     idle: Vec<usize>,
-    /// The parts of the moment, and of the watched quantities, that they ask for.
+    /// The parts of the moment, and of the watched quantities, that the watched requirements ask for.
     parts: Parts,
     /// The road users that requirements name, by index in `Space::bearers`.
     bearers: Vec<usize>,

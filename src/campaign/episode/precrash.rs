@@ -772,7 +772,7 @@ mod tests {
         parks.other.steps[0].off_road_m = 0.8;
         assert_eq!(parks.kind(), PreCrash::Parking);
 
-        // A vehicle beside the ego vehicle moves into its lane because a road user stands before it: late, or in good time.
+        // A vehicle beside the ego vehicle comes over because a road user stands before this vehicle: late, or in good time.
         let comes = |stands_m: f64| {
             let mut before = before([at(10.0, 3.5, 0.0, 10.0), at(52.0, 1.0, 0.0, 9.0)]);
             before.other.steps[0].place.velocity_mps.y = -1.5;

@@ -59,8 +59,8 @@ impl Script {
         Script { steps }
     }
 
-    /// The choice at a moment: the recorded action under the rules of the run, or its refusal. An action with a separate
-    /// moment is judged at that moment.
+    /// The choice at a moment: the recorded action under the rules of the run, or its refusal. An action with a trigger is
+    /// judged when the trigger says so.
     pub fn choose(&self, moment: &Moment) -> Choice {
         match self.steps.get(moment.step) {
             None => Choice::Stop,

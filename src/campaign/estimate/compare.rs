@@ -1,7 +1,7 @@
 //! Two driving systems in the same episodes (common random numbers): which one crashes more often?
 //!
 //! Each pair of episodes has one start and one seed of traffic and sensors. The agent draws the same values as long as both
-//! worlds are equal. Events that both share say nothing about the difference. So pairs tell two versions of one system
+//! worlds are equal. What both systems do alike says nothing about the difference. So pairs tell two versions of one system
 //! apart in far fewer kilometres than two separate counts.
 
 use std::sync::atomic::AtomicBool;

@@ -10,7 +10,8 @@ use avastra_lang::syntax::{listed, nearest};
 use crate::estimate::part::Part;
 use crate::estimate::results::Probability;
 
-/// The counted event: whether it happens in an episode. In words `counted`, `collision`, `breach`, or a requirement's name.
+/// The event of an estimate: either it happens in an episode or not. In words `counted`, `collision`, `breach`, or the name
+/// of a requirement.
 #[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(from = "String", into = "String")]
 pub enum EventKind {
@@ -77,7 +78,7 @@ impl EventKind {
         matches!(self, EventKind::Breach | EventKind::Requirement(_))
     }
 
-    /// The noun for several of them, after their number.
+    /// The word behind the number of collisions, for example `met` in `3 collisions met`.
     pub fn noun(&self) -> &'static str {
         match self {
             EventKind::Counted => "counted",

@@ -1,15 +1,16 @@
 //! Could a careful driver have avoided this collision?
 //!
 //! The world is taken back to the *takeover*, by 8 s at most. The takeover is the onset of the hazard (see `hazard`). If the
-//! ego vehicle had to give way, it is the last moment at which it could still stop, if that is earlier. All other road users
-//! then move as recorded until the recorded contact, and after it as they themselves decide. The ego vehicle is the same car
-//! on the same road. Each reference driver in turn drives it, at most as fast as a careful driver would have been there
-//! (`lawful`). A driver watches for 2 s before it takes over. It knows from the first which lane changes of the route are
-//! begun or over, and which pedestrians the ego vehicle has seen at a crosswalk.
+//! ego vehicle had to give way, and the last moment at which it could still stop is earlier than the onset, the takeover is
+//! that moment. All other road users then move as recorded until the recorded contact, and after it as they themselves
+//! decide. The ego vehicle, the same car on the same road, is driven by each reference driver in turn, at most as fast as a
+//! careful driver would have been there (`lawful`). A driver watches for 2 s before it takes over. It knows from the first
+//! which lane changes of the route are begun or over, and which pedestrians the ego vehicle has seen at a crosswalk.
 //!
 //! 1. The careful drivers drive from the takeover.
 //! 2. If none of them avoids the collision, and the ego vehicle slowed down to walking pace since, they drive from its
-//!    slowest moment. A vehicle that has dealt with the hazard and then drives on into an obstacle could have stayed.
+//!    slowest moment. A vehicle that has dealt with the hazard and then drives on into what stands in front of it
+//!    could have stayed.
 //! 3. If still none avoids it, evasive manoeuvres are tried, which begin at the takeover without any delay.
 //!
 //! **Shoves.** If a shove from another road user gave the ego vehicle most of its way to the contact, the takeover is when a
@@ -19,7 +20,8 @@
 //! none without a look aside. The question is whether staying in the lane would have avoided the collision.
 //!
 //! **Hit from behind.** Where another vehicle ran into the rear of the ego vehicle, no driver goes faster than the ego
-//! vehicle did, or leaves the way that it took. A vehicle need not flee from one behind it, which keeps the distance.
+//! vehicle did, or leaves the way that it took. A vehicle need not flee from one behind it: keeping the distance
+//! is the task of the one behind.
 //!
 //! Beside that, each careful driver is asked to the letter of UN R157 (`r157_letter`). From the first conflict of ways on,
 //! the ego vehicle drives along its recorded path at its recorded speed until the model reacts. Then it only brakes. The
@@ -636,7 +638,7 @@ mod tests {
         assert!(
             slower.throttle_pct == 0.0 && (slower.brake_pct - pedals_for(-COMFORTABLE_MPS2).1).abs() < 1e-9
         );
-        // A vehicle that brakes harder by itself is left alone.
+        // A driver that brakes harder by itself is left alone.
         let brakes = Case::slowed(
             &Case {
                 recording: &[],

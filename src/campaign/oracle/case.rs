@@ -33,7 +33,7 @@ impl Found {
         }
     }
 
-    /// Its noun.
+    /// The noun for it: `crash` or `breach`.
     pub fn noun(self) -> &'static str {
         match self {
             Found::Collision(_) => "crash",

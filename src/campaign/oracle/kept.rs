@@ -3,9 +3,9 @@
 //! A careful driver drives the same steps from the start of the episode, under the same rules: an action happens at the
 //! same time with the same values, if it is legal there, too. Most requirements are about the drive up to then rather
 //! than about a last moment. So the question begins at the start, and not at a hazard as for a collision. A driver that
-//! comes to the same place a little later must keep it there, too: the question ends one step after the step of the breach.
-//! Up to then the careful driver must not have breached the requirement. A driver that touches a road user before the
-//! moment of the breach has not come to it, and is left out.
+//! comes to the same place a little later must keep the requirement there, too. So the question ends one step after that of
+//! the breach. Up to then the careful driver must not have breached the requirement. A driver that touches a road user
+//! before the moment of the breach has not come to it, and is left out.
 
 use std::cmp::Ordering;
 

@@ -1,5 +1,5 @@
 //! How fast a careful driver would have been going: within the limit, within its sight, and so that it can stop for a
-//! pedestrian at a crosswalk.
+//! pedestrian who waits at a crosswalk or crosses on it.
 //!
 //! A driver that was faster is judged as accident analysts do: from the same place, at the speed that was allowed there
 //! ("avoidable at the permitted speed").
@@ -68,7 +68,8 @@ pub fn lawful_mps(world: &World, minded: &Minded) -> f64 {
     if own_mps > careful_mps + SPEEDING_MPS { careful_mps } else { own_mps }
 }
 
-/// The speed from which a driver stops for pedestrians waiting at the next crosswalk, m/s; infinite without any.
+/// The speed from which a driver can stop for the pedestrians that it has seen at the next crosswalk and that have not
+/// crossed, m/s; infinite without any.
 fn crosswalk_mps(world: &World, minded: &Minded) -> f64 {
     let front_m = VehicleParameters::MKZ.front_m(world.ego_station_m());
     let Some((begin_m, _)) = next_crosswalk(world) else { return f64::INFINITY };

@@ -11,9 +11,9 @@
 //! | tracking | longest time in which it was not known, s | whether it was detected | publication, and the time that looks take |
 //! | prediction | error of the most probable future after a second, m | see [`Forecast::error_m`] | half a lane, ours |
 //!
-//! Draws within the specification exceed these bounds now and then. Such an error says that the module had bad luck, or
-//! that its specification allows too much. Left out: planning, control and emergency
-//! braking, whose output has no truth to compare with, and latency, which is a constant of the settings.
+//! Draws within the specification exceed these bounds now and then. An excess in these seconds says that the module had
+//! bad luck, or that its specification allows too much. Left out: planning, control and emergency braking, whose output has
+//! no truth to compare with, and latency, which is a constant of the settings.
 
 use crate::episode;
 use avastra_base::geometry::Vec2;

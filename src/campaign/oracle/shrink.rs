@@ -217,7 +217,7 @@ enum Purpose {
 struct Search<'a> {
     setup: &'a Setup,
     wanted: Wanted,
-    /// The log that is shrunk, and how hard its finding is.
+    /// The log and the finding that are shrunk, and how hard the finding is.
     log: &'a EpisodeLog,
     found: Found,
     worth: Worth,

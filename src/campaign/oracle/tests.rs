@@ -176,7 +176,7 @@ fn un_r157_puts_the_border_of_a_standing_pedestrian_at_24_m() {
     assert_eq!(stands(28.0), Avoidability::Avoidable);
 }
 
-/// On a wet road no vehicle brakes with the 7.6 m/s² of a dry one, to the letter of the regulation either.
+/// On a wet road no vehicle brakes with the 7.6 m/s² of a dry road, not even to the letter of the regulation.
 #[test]
 fn the_letter_of_un_r157_brakes_no_harder_than_the_road_allows() {
     let letter = |wet: Level, distance_m: f64| {

@@ -1,6 +1,7 @@
 //! Small changes of a scenario, and how often it crashes, or breaches a requirement, under them.
 //!
 //! On a street, no value of a scenario repeats to the last digit. A variation changes each of these by its own draw:
+//!
 //! - the time of an action: normal, 0.1 s, cut at 0.3 s (the first action stays at the start);
 //! - every speed that an action draws: normal, 2 %, cut at 6 %;
 //! - the phase of the signals: normal, 0.1 s, cut at 0.3 s;

@@ -202,7 +202,7 @@ impl<'a> Offers<'a> {
         agent.choose(observation, self, &mut rng)
     }
 
-    /// The choice of that row for the step.
+    /// The choice for the step if that row is chosen; without a row nothing happens.
     pub fn choice(mut self, row: Option<usize>) -> Choice {
         row.map_or(Choice::Pass, |row| {
             self.is_legal(row);

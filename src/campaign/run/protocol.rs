@@ -163,7 +163,7 @@ impl Database {
             let breaches = of_episode(&breaches, episode, |breach| breach.0);
             let mut begun: Vec<usize> = (0..steps.len()).filter(|at| steps[*at].action.is_some()).collect();
             let offered = of_episode(&offered, episode, |offer| offer.0);
-            // Such an episode notes only its own row as offered, whatever else it plays.
+            // An episode that was asked for one row notes only that row as offered, whatever else it plays.
             let own = offered.first().and_then(|(_, row)| usize::try_from(*row).ok());
             let asked = protocol.and_then(|space| space.rows.get(own?));
             // The rows before the one that was asked for make road users appear.

@@ -220,16 +220,12 @@ impl Layout {
     }
 
     /// Checks that its pages are sound and its settings those that it was begun with.
-    pub(super) fn check(&self, connection: &Connection, settings: &str) -> Result<(), DatabaseError> {
+    fn check(&self, connection: &Connection, settings: &str) -> Result<(), DatabaseError> {
         let state: String = connection.pragma_query_value(None, "quick_check", |row| row.get(0))?;
         if state != "ok" {
             return Err(DatabaseError::Damaged { what: state });
         }
-        let begun: String = connection.query_row("SELECT settings FROM begun", [], |row| row.get(0))?;
-        if let Some(what) = differences(&begun, settings) {
-            return Err(DatabaseError::Settings { what });
-        }
-        Ok(())
+        check_settings(connection, settings)
     }
 
     /// The numbers of the units whose rows were changed, rising. A unit that has rows in any table and no seal counts as
@@ -348,6 +344,12 @@ fn name_units(connection: &Connection, numbers: &[i64]) -> Result<(), rusqlite::
     Ok(())
 }
 
+/// Refuses settings other than those that a database was begun with.
+pub(super) fn check_settings(connection: &Connection, settings: &str) -> Result<(), DatabaseError> {
+    let begun: String = connection.query_row("SELECT settings FROM begun", [], |row| row.get(0))?;
+    differences(&begun, settings).map_or(Ok(()), |what| Err(DatabaseError::Settings { what }))
+}
+
 /// The digest of the settings that a database was begun with.
 pub(crate) fn settings_digest(connection: &Connection) -> Result<[u8; 32], rusqlite::Error> {
     let settings: String = connection.query_row("SELECT settings FROM begun", [], |row| row.get(0))?;
@@ -367,7 +369,7 @@ pub(super) fn open_file(path: &Path, flags: OpenFlags) -> Result<Connection, Dat
 ///
 /// # Errors
 /// If the file or its journal is no regular file: SQLite follows links and waits for pipes. If the journal has further
-/// names. If the file is in the journal mode WAL.
+/// names. If the file is in the journal mode WAL, or a `-wal` file lies beside it.
 pub(super) fn path_of(path: &Path) -> Result<PathBuf, DatabaseError> {
     let beside = |ending: &str| {
         let mut name = path.as_os_str().to_owned();

@@ -13,7 +13,8 @@ use sha2::{Digest, Sha256};
 
 use crate::files::{PlainName, Temporary};
 use crate::run::sealed::{
-    DatabaseError, IfEmpty, Layout, add_rows, check_declared, declared, open_file, path_of, query_all,
+    DatabaseError, IfEmpty, Layout, add_rows, check_declared, check_settings, declared, open_file, path_of,
+    query_all,
 };
 
 /// A unit to take over: its number in the other file, and the number that it gets here.
@@ -88,11 +89,12 @@ pub trait Units: Sized {
         Ok((Self::from_connection(connection), damaged))
     }
 
-    /// That these settings are not those with which a file was begun, if so; `None`, too, of a file that cannot be read.
+    /// The error that these settings are not those with which a file was begun; `None` if they are, or if the file cannot be
+    /// read.
     fn edited(path: &Path, settings: &str) -> Option<DatabaseError> {
         let connection = open_file(path, OpenFlags::SQLITE_OPEN_READ_WRITE).ok()?;
         let is_ours = Self::LAYOUT.is_in(&connection).ok()? && Self::LAYOUT.check_tables(&connection).is_ok();
-        let error = is_ours.then(|| Self::LAYOUT.check(&connection, settings))?.err()?;
+        let error = is_ours.then(|| check_settings(&connection, settings))?.err()?;
         matches!(error, DatabaseError::Settings { .. }).then_some(error)
     }
 

@@ -47,7 +47,7 @@ pub struct Finding {
     pub recurrence: Option<Recurrence>,
     /// Whether it is proved that no step before it can be left out.
     pub minimal: bool,
-    /// The author's name of the obstacle, if its body is one that the author defined.
+    /// The author's name for the obstacle, if its body is one that the author defined.
     pub own_body: Option<String>,
 }
 

@@ -268,7 +268,7 @@ fn agent_results(measured: MeasuredAgent, cells: &[&CellRecord]) -> AgentResults
 
 /// A measure's mean over cells. No measure is below 0, so the interval is cut off there. If all cells are 0, Student's
 /// interval has no spread. A count then gets the interval of Poisson's distribution, which assumes that collisions are
-/// independent and trainings identical.
+/// independent and all trainings have the same rate.
 pub(super) fn estimate(measure: &str, cells: &[&MeasuredCell]) -> Option<Estimate> {
     let found = mean(&values(measure, cells))?;
     let is_count = MEASURES.iter().any(|one| one.name == measure && one.is_count);

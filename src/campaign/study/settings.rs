@@ -101,7 +101,7 @@ const REPEATS_MAX: u32 = 10_000;
 const REPEATS: u32 = 10;
 /// Episodes of a training if the file gives no number: the default of `avastra train`.
 const TRAINING_EPISODES: u32 = 750;
-/// With `--quick`, this many trainings or repetitions of an agent, and episodes of a training, are left. Ours.
+/// With `--quick`, at most this many trainings or repetitions of an agent, and episodes of a training, are left. Ours.
 pub const QUICK_REPEATS: u32 = 2;
 pub const QUICK_EPISODES: u32 = 12;
 

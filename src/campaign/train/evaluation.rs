@@ -1,4 +1,4 @@
-//! The figures of an agent that does not learn. They can be checked by playing again.
+//! The figures of an agent while it does not learn. They can be checked by playing again.
 
 use std::collections::BTreeMap;
 

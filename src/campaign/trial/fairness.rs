@@ -13,7 +13,7 @@ use avastra_world::sim::World;
 /// Rounding of figures, m.
 const SLACK_M: f64 = 0.1;
 
-/// The unfairness of the road user with this id, in words.
+/// Why the road user with this id appeared unfairly, in words; `None` if it appeared fairly or is gone.
 pub(super) fn complaint(world: &World, request: &SpawnRequest, id: u32) -> Option<String> {
     let newcomer = world.obstacle(id)?;
     let overlaps = world

@@ -2,8 +2,9 @@
 //! On each road some drives go by without an action. At each of their steps every row is offered, as to an agent; this
 //! counts how often the row is legal, and which reasons refuse it otherwise. From some of the legal moments, spread
 //! over all of them, the row is carried out and what happens is judged. So a row on a road is realised, or not realised
-//! (with the reason), or masked (with the reasons). A row may be legal at no moment because its road user must be there
-//! first. It is then offered after a row that makes this road user appear: the first after which it is legal.
+//! (with the reason), or masked (with the reasons). A row may be legal at no moment because the road
+//! user that it is about must be there first. It is then offered after a row that makes this road user appear: the first
+//! after which it is legal.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -15,7 +16,6 @@ use avastra_base::rng::Stream;
 use avastra_base::threads::in_order;
 use avastra_drivers::Ads;
 use avastra_lang::model::Row;
-use avastra_lang::model::command::Command;
 use avastra_lang::model::vocabulary::{Field, Phenomenon};
 use avastra_world::action::{ActionTable, Count, Draw, Effect, Offer, SpawnRequest};
 use avastra_world::sim::{Sensed, World};
@@ -295,11 +295,7 @@ fn attempt(moment: &Moment, draw: &Draw, bearers: &[String]) -> Try {
     };
     for (nth, id) in watched.iter().copied() {
         let (request, told) = match &draw.effects[nth] {
-            Effect::Spawn(request) => {
-                let mut turns = Command::default();
-                turns.set(Field::Turn, request.told.get(Field::Turn).copied());
-                (Some(request), turns)
-            }
+            Effect::Spawn(request) => (Some(request), request.told.only(&[Field::Turn])),
             Effect::Order(order) => (None, order.command),
             Effect::Time(_) | Effect::Sky(..) | Effect::Light(_) => continue,
         };

@@ -1,6 +1,6 @@
 //! `avastra ads check`: whether a driving system follows the protocol and is deterministic, and how fast it is.
 //!
-//! The check drives whole episodes with other road users around the ego vehicle. A driving system that answers the first
+//! The check drives whole episodes with random actions around the ego vehicle, because a driving system that answers one
 //! step well may fail at the hundredth. Each failure is named with its stage and what to do about it.
 
 use std::sync::Arc;
@@ -32,7 +32,7 @@ const BROKEN_OFF_STEPS: usize = 2;
 /// Lines of standard error that are shown.
 const STDERR_LINES: usize = 12;
 
-/// The result of one stage.
+/// The result of one check.
 #[derive(Debug, Serialize)]
 struct Part {
     /// In a word: `start`, `episode`, `reset`, `process`, `orders`, `close`.

@@ -272,7 +272,7 @@ mod tests {
         goes.sensed.objects = vec![object(1, Body::Sedan, Pose::new(0.0, TARGET_Y_M, 0.0), 8.0)];
         goes.run(15.0);
         assert!(is_at(&goes, TARGET_Y_M), "{:?}", goes.place());
-        // Without other road users the change takes the time that it indicates.
+        // Without other road users, too, the change begins only once the lane has been clear for 1 s.
         let mut free = Keeps::rig(300.0, None);
         free.run(0.9);
         let begins_m = free.place().y;

@@ -659,7 +659,7 @@ mod tests {
         }
     }
 
-    /// The same value for a number whether it is written as an integer or not.
+    /// Whether two values are the same. A number is the same whether it is written as an integer or not.
     fn alike(a: &Value, b: &Value) -> bool {
         match (a, b) {
             (Value::Number(a), Value::Number(b)) => a.as_f64() == b.as_f64(),

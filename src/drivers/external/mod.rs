@@ -1,8 +1,8 @@
 //! Driving systems outside this program: any program that speaks avastra-ads/1 (PROTOCOL.md) over pipes or a socket.
 //!
 //! `message` has the messages and `question` fills those that are asked; `link` moves lines, `session` speaks with one
-//! process, `program` keeps the processes and the known answers, and `driver` is one episode. An error of the program
-//! is a `finding`, never a collision and never an error of the run.
+//! process, `program` keeps the processes and the known answers, and `driver` is one episode. An error of a driving
+//! system is a `finding`, never a collision and never an error of the run.
 
 mod driver;
 mod finding;

@@ -122,7 +122,7 @@ impl Outcome {
 /// The identity of an external driving system and the settings it was asked with; scenarios have both in one line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Attached {
-    /// The identity that the program gave; `None` if it never came so far.
+    /// The identity that the program gave; `None` if the program never came so far.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub identity: Option<Identity>,
     pub settings: ExternalSettings,

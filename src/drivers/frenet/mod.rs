@@ -5,10 +5,10 @@
 //! against forecasts of the others (`traffic`), scores what comes out, and drives the best. If the best would
 //! collide soon, it brakes as hard as it can.
 //!
-//! It lacks the same as the publications. It knows no right of way beside lights, stop signs and crosswalks. It
-//! leaves keeping clear to the vehicles that follow it or drive beside it. It looks no farther ahead than 4 s.
-//! Left out of them are nuPlan's map formats, the simulated tracker (a plan is taken to be driven as planned)
-//! and Werling's following and stopping quintics.
+//! It lacks what the publications lack: it knows no right of way except at lights, stop signs and crosswalks, it
+//! relies on the vehicles that follow it or drive beside it to keep clear of it, and it looks no farther ahead than
+//! 4 s. Not taken over from the publications are nuPlan's map formats, the simulated tracker (a plan is taken to be
+//! driven as planned) and Werling's following and stopping quintics.
 
 mod driver;
 mod lateral;

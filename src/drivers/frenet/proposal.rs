@@ -2,14 +2,14 @@
 //!
 //! A proposal is a lateral curve, driven at one of five parts of the limit (PDM-Closed: Dauner, Hallgarten,
 //! Geiger, Chitta 2023). Its speed follows a quartic to that part (Werling: velocity keeping). Behind a
-//! leader, the interaction term of the intelligent driver model is taken off it, so a proposal is rolled out
-//! against the forecasts of others. Werling's quintics for following and stopping are left out: PDM-Closed
-//! takes a red light as something that stands there, and so does this.
+//! road user or a stop line, the interaction term of the intelligent driver model is taken off its acceleration,
+//! so a proposal is rolled out against the forecasts of others. Werling's quintics for following and stopping are
+//! left out: PDM-Closed takes a red light as something that stands there, and so does this.
 //!
 //! The score is that of nuPlan's closed loop as PDM-Closed uses it: no collision at fault, times the weighted
 //! mean of progress, time to collision and comfort. Its other factors, drivable area and driving direction,
 //! hold by construction: `lateral` samples no offset outside the lanes of the own direction. Werling's costs
-//! decide between proposals with the same score.
+//! decide between proposals that score nearly the same.
 
 use crate::kit::{BESIDE_M, FOLLOWED_MPS, Guide, HARDEST_MPS2, Point, Stop, speed_mps2};
 use crate::status::Reason;

@@ -15,8 +15,8 @@ pub const BESIDE_M: f64 = 1.0;
 /// The reason for keeping away from a slower road user ahead is called a stop, not following, m/s. Ours.
 pub const FOLLOWED_MPS: f64 = 0.5;
 
-/// The stations that a road user takes of the corridor in the lane `lateral_m` to the left of a guide, and its speed
-/// along them, m/s. `front_m` is the station of the vehicle's front.
+/// The stations that a road user takes of the corridor in the lane `lateral_m` to the left of a guide, and the road
+/// user's speed along them, m/s. `front_m` is the station of the vehicle's front.
 pub fn in_lane(guide: &Guide, object: &SensedObject, lateral_m: f64, front_m: f64) -> Option<(Span, f64)> {
     let rear_m = front_m - VehicleParameters::MKZ.length_m;
     let at = guide.project(object.pose.position, rear_m - guide.range_m(), front_m + guide.range_m());

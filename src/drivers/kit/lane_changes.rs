@@ -75,7 +75,7 @@ impl RouteChanges {
         }
     }
 
-    /// The lane is not clear, or another part says that the change has to wait.
+    /// The lane is not clear, or an external driving system says that the change has to wait.
     pub fn wait(&mut self) {
         self.clear_s = 0.0;
     }

@@ -55,7 +55,7 @@ pub struct Reference<M> {
     demand: Option<(f64, u32)>,
     /// The objects in sight at the last looks, the newest last.
     looks: VecDeque<Vec<SensedObject>>,
-    /// The scene that the route's driver is shown; kept for its buffers.
+    /// The senses that the route's driver is given; kept for their buffers.
     shown: Option<Sensed>,
     /// The encounters of the last look by object.
     watched: BTreeMap<u32, Encounter>,

@@ -3,12 +3,12 @@
 //! It sees everything within 120 m, hidden or not, looking around ten times a second. Around the model stand
 //! rules of our own. It stops at red and yellow lights where it can, and at stop signs. It brakes for road users
 //! and objects on its way. It gives way to a road user that would cross its way at nearly the same time, unless
-//! it has priority and the other is not seen to take it (`giving_way`). Predictions are straight lines at
-//! constant speed.
+//! the ego vehicle has priority and the road user is not seen to take it (`giving_way`). Predictions are straight
+//! lines at constant speed.
 //!
-//! It begins a lane change of the route once no vehicle in the target lane would have to brake hard for it,
-//! nor it for them. This is the safety criterion of MOBIL (Kesting, Treiber, Helbing 2007). Until then it
-//! stays in its lane and stops where a short change is just possible.
+//! It begins a lane change of the route once no vehicle in the target lane would have to brake hard for
+//! the ego vehicle, nor the ego vehicle for it. This is the safety criterion of MOBIL (Kesting, Treiber, Helbing 2007).
+//! Until then it stays in its lane and stops where a short change is just possible.
 
 use std::sync::Arc;
 
@@ -51,7 +51,7 @@ pub struct Idm {
     is_beset: bool,
     steering: Arc<Steering>,
     helm: Helm,
-    /// The obstacles that it keeps away from, looked for every fifth tick.
+    /// The road users and lines that it keeps away from, looked for every fifth tick.
     ahead: Vec<Ahead>,
     signs: Signs,
     status: Status,

@@ -36,7 +36,7 @@ pub struct Recording {
     pub seen: Recorder,
     /// The road in its space, with its trajectories.
     pub road: Road,
-    /// The road users that appear at the start, as they were told.
+    /// The spawns of road users that appear at the start and get no orders later.
     pub told: Vec<Told>,
     /// Names of the author's own bodies, by number of the road user.
     pub own_bodies: BTreeMap<u32, String>,

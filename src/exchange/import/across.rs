@@ -14,7 +14,8 @@ use super::source::{Mark, Source};
 /// The largest lateral speed of an order, m/s.
 const ASIDE_MPS_MAX: f64 = 10.0;
 
-/// Above this part of its speed, a lateral move makes a vehicle markedly slower along its way in the file's player.
+/// A lateral move that is faster than this part of an entity's speed makes it markedly slower along its way in the
+/// file's player.
 const SLOW_PART: f64 = 0.15;
 
 /// A way is looked at in such steps for the roads that it leads over, m.

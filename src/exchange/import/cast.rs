@@ -253,8 +253,8 @@ impl Moving<'_> {
         Some(self.station_m(point))
     }
 
-    /// The station of an entity whose reference point in the file is there, m. For a pedestrian the language means the
-    /// middle.
+    /// The station of an entity whose reference point in the file is there, m. For a pedestrian or an animal the
+    /// language means the middle.
     pub fn station_m(&self, point: Vec2) -> f64 {
         self.path.project(point).station_m + self.more_m()
     }

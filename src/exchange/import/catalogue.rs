@@ -36,7 +36,7 @@ struct Entry {
     reason: String,
     /// The parts of it that are not read.
     noted: BTreeSet<String>,
-    /// The name in its catalogue, if only its file has the name that was asked for.
+    /// The name that its catalogue gives itself, if only the catalogue's file has the name that was asked for.
     other_name: Option<String>,
 }
 

@@ -326,7 +326,7 @@ impl Waiting<'_, '_> {
         self.cast.lanes_beside(source, mark, &room.of, lanes, room.has_oncoming).map(Some)
     }
 
-    /// The road users that count for a condition about free room.
+    /// The names of the entities that count for a condition about free room.
     pub fn counted(&self, source: &mut Source, mark: &Mark, room: &Clearance) -> Option<Vec<String>> {
         let ahead = self.cast.looks_ahead(source, mark, &room.of)?;
         let mut counted = Vec::new();
@@ -494,7 +494,7 @@ impl Waiting<'_, '_> {
         source.refuse_if(is_just, mark, AT_ITS_BOUND)
     }
 
-    /// Refuses a place of an entity that moves laterally on the way there: the place counts across, too.
+    /// Refuses a condition on the place of an entity that moves laterally on the way there: the place counts across, too.
     fn stays_beside(&self, source: &mut Source, condition: &Condition, entity: &str) -> Option<()> {
         if self.cast.is_ego(entity) {
             return Some(());

@@ -8,12 +8,12 @@
 //! `variation` reads the values of a distribution, and `chance` draws those that it leaves to chance. For each variation
 //! `story` reads the scenario, with `body`, `position`, `shape`, `action`, `trigger` and `weather` for its elements. It
 //! reads them through `source`, which fills in each `parameter` and its `expression`, and `catalogue`, which finds the
-//! content of other files. `vocabulary` refuses elements that no file may hold. `place` finds places on the map. `scene`
-//! gives each entity a way, to which `ways` joins trajectories. `phases` writes the actions, `pace` their speeds, and
-//! `condition` the moments at which they begin, as `said`: text with its numbers apart. `order` refuses events that may
-//! come at another time, by what `estimate` knows of how all entities begin. `rows` finds how the numbers follow from the
-//! parameters, `sky` how weather changes, and `write` prints the space. A file that avastra exported carries its scenario
-//! (`own`). No file is read here: `cli` gives texts.
+//! content of other files. `vocabulary` refuses elements and attributes that no file may have. `place` finds places on the
+//! map. `scene` gives each entity a way, to which `ways` joins trajectories. `phases` writes the actions, `pace` the
+//! speeds, and `condition` the moments at which the actions begin, all as `said`: text with its numbers apart. `order`
+//! refuses events that may come at another time, by what `estimate` knows of how all entities begin. `rows` finds how the
+//! numbers follow from the parameters, `sky` how weather changes, and `write` prints the space. A file that avastra
+//! exported carries its scenario (`own`). No file is read here: `cli` gives texts.
 
 mod across;
 mod action;

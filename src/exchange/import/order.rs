@@ -221,7 +221,8 @@ impl<'e> Sequence<'e> {
         times?.into_iter().reduce(f64::max)
     }
 
-    /// The events that may still be under way when an event comes: they are before it, take a time, and may not be over.
+    /// The events that may still be under way when an event comes: those before it that take
+    /// time and are not known to be over.
     fn under_way(&self, event: &Event) -> Vec<&'e Event> {
         let at = self.events.iter().position(|(own, _)| core::ptr::eq(*own, event)).unwrap_or(0);
         let (comes_s, after_s_min) =
@@ -582,7 +583,7 @@ fn edges_are_alone(source: &mut Source, trigger: &Trigger, all: &[Condition]) ->
 fn runs_on(source: &mut Source, trigger: &Trigger, all: &[Condition]) -> Option<()> {
     for own in all.iter().filter(|one| one.is_running && !one.is_of_act && all.len() > 1) {
         let (When::Begun { name, .. } | When::Ended { name, .. }) = &own.kind else { continue };
-        // A condition that holds while it runs, and after it, holds from its beginning.
+        // A condition that holds while an element runs, and after it, holds from the beginning of the element.
         let is_after =
             |other: &Condition| matches!(&other.kind, When::Ended { name: ended, .. } if ended == name);
         let goes_on = trigger.iter().any(|other| other.iter().any(is_after));

@@ -15,7 +15,7 @@ use super::source::{Mark, Source};
 /// A shorter wait is none, s.
 const LEAST_S: f64 = 1e-4;
 
-/// The fields of an order that set a vehicle's speed.
+/// The fields of an order that set the speed.
 pub const PACE: [&str; 7] = ["speed", "rate", "continuous", "early", "at", "reach", "steady"];
 
 /// The stiffness of the spring by which esmini keeps a distance, for each m/s² of the bound, 1/m.
@@ -236,7 +236,7 @@ impl<'a> Cast<'a> {
         Some((of, too_far))
     }
 
-    /// Whether a road user beside the ego vehicle drives at one speed from the beginning on.
+    /// Whether an entity other than the ego vehicle drives at one speed from the beginning on.
     fn keeps_its_speed(&self, name: &str) -> bool {
         let Some(entity) = self.story.entity(name) else { return false };
         let is_timed = entity.way.as_ref().is_some_and(|way| way.timing.is_some());

@@ -334,7 +334,7 @@ impl<'a> Cast<'a> {
         Some(script.phases)
     }
 
-    /// The state of an entity where a trajectory ends.
+    /// Sets the state of an entity to the end of a trajectory, where its next orders begin.
     fn told_at_the_end(&self, moving: &Moving<'a>, leg: &Leg, told: &mut Told) {
         (told.at_m, told.lane, told.offset_m) = (leg.end_m, leg.lane, 0.0);
         told.lane_m = leg.lane.map_or(0.0, |lane| self.aside_m(moving, told.at_m, lane));

@@ -24,7 +24,7 @@ use super::weather::{Weather, weather};
 /// The latest minor version that is read.
 const MINOR_MAX: i32 = 3;
 
-/// The most actions of one entity: as many as a manoeuvre of the language has phases.
+/// The most events of one entity: as many as a manoeuvre of the language has phases.
 const PHASES_MAX: usize = 100;
 
 /// How long a scenario is played that names no time for its end, s.
@@ -158,7 +158,7 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>) -> Opti
         source.note("traffic lights follow the map's controllers, not the phases of the file");
     }
     let entities = entities(source, root);
-    // An entity that is given a controller later is taken to have it from the beginning.
+    // If the file assigns a controller anywhere, all entities are taken to have one from the beginning.
     if root.descendants().any(|node| node.has_tag_name("AssignControllerAction")) {
         source.controlled.extend(entities.iter().map(|entity| entity.name.clone()));
     }

@@ -95,8 +95,8 @@ fn told_in(settings: &str) -> Option<Told> {
 /// The traffic profile of runs that ask for none.
 const CAREFUL: &str = "careful";
 
-/// The conditions of a run, a training, a study or an estimate, by its settings: name and text of each. Nothing if they
-/// are of a version that wrote them otherwise.
+/// What a run, a training, a study or an estimate played against what, by its settings: name and text of each condition.
+/// Nothing if the settings are of a version that wrote them otherwise.
 fn conditions(settings: &str) -> Vec<(&'static str, String)> {
     let Some(of) = told_in(settings) else { return Vec::new() };
     let program = of.external.as_ref().map(Attached::name);

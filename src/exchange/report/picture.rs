@@ -1,7 +1,7 @@
 //! Top views as SVG, for papers and tickets: road, signals, ego vehicle, others, what is perceived and what is planned.
 //!
 //! One panel is one moment, north up, as near as the ego vehicle and what it hits allow; each has its own scale. True
-//! road users are filled. They have their heading, their speed (an arrow for the way of the next second), the lights of
+//! road users are filled. They show their heading, their speed (an arrow for the way of the next second), the lights of
 //! those that brake, and their way since the first panel. The beliefs of the driving system are dashed, so that a missed
 //! or misplaced object is seen at a glance. A caption says in words what a panel shows.
 

@@ -131,8 +131,8 @@ pub fn record_another(
     Ok((recording, change))
 }
 
-/// Why the obstacle of a collision did not appear in another drive. Mostly a rule of its author refuses the spawn at the
-/// other speed. `None` if that drive was over before.
+/// Why the obstacle of a collision did not appear in another drive: mostly, a rule that the scenario's author wrote
+/// refuses the spawn at the other speed. `None` if that drive was over before.
 fn refused_there(log: &EpisodeLog, index: usize, other: &EpisodeLog) -> Option<String> {
     let obstacle = log.collisions[index].contact.obstacle;
     let appears =
@@ -308,7 +308,7 @@ fn crashes(table: &ActionTable, log: &EpisodeLog) -> Vec<Value> {
     .collect()
 }
 
-/// The rules that the ego vehicle broke, and that careful drivers would have kept, as the file claims.
+/// The requirements that the ego vehicle breached, and which careful drivers would have kept each, as the file claims.
 fn breaches(table: &ActionTable, scenario: &Scenario, log: &EpisodeLog) -> Vec<Value> {
     let told = |breach: &Breach| {
         let RequirementDef { name, docs, formula, margin, .. } =

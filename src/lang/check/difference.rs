@@ -1,8 +1,8 @@
 //! The differences between two spaces: declarations, rules, rows and ranges.
 //!
 //! Declarations are compared by exactly the texts that the digest covers (`meaning`), so a difference is told if and only
-//! if the digests differ. Rules are also compared by the ranges that they leave, where both spaces have them. Rows are
-//! compared by their labels, and draws by the ranges that all rules together leave.
+//! if the digests differ. Rules are also compared by what they leave of the ranges that both spaces have. Rows are compared
+//! by their labels, and draws by the ranges that all rules together leave.
 
 use core::fmt;
 use std::collections::{BTreeMap, BTreeSet};
@@ -92,8 +92,8 @@ impl<'a> Side<'a> {
         self.rows.get(other.label.as_str()).copied()
     }
 
-    /// Whether something is declared in another way that a rule's meaning may hang on besides its own text. That of an
-    /// action is not: what its parameters may be is no work of the rule's.
+    /// Whether something besides a rule's own text, on which its meaning may depend, is declared in another way. Actions do
+    /// not count: the range of their parameters is no work of the rule.
     fn has_other_terms(&self, other: &Side<'_>) -> bool {
         let differs = |of: &Side<'_>, than: &Side<'_>| {
             let mut terms =

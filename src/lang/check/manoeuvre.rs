@@ -248,7 +248,7 @@ impl Checker {
         Some(PhaseDef { once, held, within, after, only_if, command, then: as_written(then)? })
     }
 
-    /// Reports a written-out figure of a phase that is out of its bounds. A computed figure is brought into them later.
+    /// Reports a figure of a phase that is written out and lies out of bounds. A computed figure is brought into them later.
     fn check_figure(&mut self, expr: &Expr, name: &str, unit: &str, bounds: &RangeInclusive<f64>) {
         if self.written_out(expr).is_some_and(|value| !bounds.contains(&value)) {
             let message = format!("the `{name}` of a phase lies out of bounds");

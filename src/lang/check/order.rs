@@ -56,7 +56,7 @@ impl Checker {
             Some(Who::Named(_)) | None => self.obeys.get(&who.text).copied(),
         };
         let has = has.unwrap_or(Told::BY_DRIVERS);
-        // A pedestrian is never told a rate.
+        // A road user on foot is never told a rate.
         let moves = Moves::told(has);
         if bearer.is_some() && !has.covers(told.and(command.told())) {
             let message = format!("`{}` cannot be told that", who.text);
@@ -76,7 +76,7 @@ impl Checker {
         self.reject(error.help("write its name and what it is given: `then: brake(4 m/s^2)`"))
     }
 
-    /// Reads the fields that an order or a phase tells a vehicle; `None` after a mistake, which is reported.
+    /// Reads the fields that an order or a phase tells a road user; `None` after a mistake, which is reported.
     pub(super) fn command(
         &mut self,
         fields: &[(Field, &ast::Expr)],
@@ -119,8 +119,8 @@ impl Checker {
         command.filter(|_| all)
     }
 
-    /// Reads the fields of an order but for those that are read separately; `None` after a mistake, which is reported. All
-    /// fields are read before a wrong one leaves them out.
+    /// Reads the fields of a spawn, an order or a phase but for those that are read separately; `None` after a mistake,
+    /// which is reported. All fields are read, also after a wrong one.
     pub(super) fn told_by(
         &mut self,
         fields: &[(Field, &ast::Expr)],

@@ -37,7 +37,7 @@ pub(super) fn breaches(space: &Space, moment: &Moment<'_>, in_force: &RulesInFor
     let rules = RowRules { space, row: moment.row, road, in_force };
     let (_, before) = moment.history.last().expect("it begins with the start");
     let candidate = Candidate { values: moment.locals, before, after: moment.after, world: None };
-    // Conditions on facts of the moment are judged when the scenario is played.
+    // Conditions on states that depend on the moment are judged when the scenario is played.
     let of_the_moment = space.cells_of_the_moment();
     let error = |breach: Breach<'_>| {
         if !of_the_moment.is_empty() && is_about(space, &breach, &of_the_moment) {

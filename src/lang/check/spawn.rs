@@ -250,9 +250,9 @@ impl Checker {
         })
     }
 
-    /// Reports `Follow` without a trajectory, a trajectory with another verb, and a place off the trajectory. A station
-    /// counts `at` one of a map, a distance `ahead` or `behind` on one beside the ego vehicle's route. `ways` are the
-    /// possible trajectories, and whether the place is a station.
+    /// Reports `Follow` without a trajectory, a trajectory with another verb, and a place of the wrong kind for the
+    /// trajectory: one on a map takes a station (`at`), one beside the ego vehicle's route a distance (`ahead` or `behind`).
+    /// `ways` are the possible trajectories, and whether the place is a station.
     fn check_trajectory(
         &mut self,
         is_on: bool,

@@ -30,7 +30,7 @@ pub enum Part {
     OverLine,
     OverCrosswalk,
     OverOncoming,
-    /// The ego vehicle in its route's lane.
+    /// Facts of the ego vehicle in its route's lane.
     Lane,
     EgoOffRoad,
     Crosses,

@@ -9,7 +9,7 @@ use crate::model::on_route::Stretch;
 use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::{Crossing, LaneChoice, Light, Priority, RoadKind, Turn};
 
-/// The placeholder for a value that was not looked up.
+/// The value of a fact that nobody looked up.
 pub trait Unknown {
     const UNKNOWN: Self;
 }
@@ -195,7 +195,7 @@ of_facts! {
         pub lane_left_m: f64,
         /// Limit of the lane that it is in.
         pub limit_mps: f64,
-        /// The next light on its way; none for a pedestrian.
+        /// The next light on its way; none for a road user on foot.
         pub light: Light,
         pub light_times: LightTimes,
         /// Which of it and the ego vehicle goes first, since one of them came into the other's way.
@@ -228,7 +228,8 @@ of_facts! {
         /// Where it is along the trajectory that it follows; 0 if it follows none.
         pub station_m: f64,
         pub has_siren: bool,
-        /// Whether it has crashed with a road user other than the ego vehicle. Known for a road user that is there.
+        /// Whether it has crashed with a road user other than the ego vehicle. Known only for a road user that
+        /// is there.
         pub crashed: bool,
         /// Whether it is the road user ahead of the ego vehicle, how many lanes left of the ego vehicle's lane it is, and
         /// how far off the road, m. Known to requirements alone.
@@ -237,7 +238,7 @@ of_facts! {
         pub off_road_m: f64,
         /// Whether it drives in the junction that is the next one of the ego vehicle's route.
         pub in_next_junction: bool,
-        /// Its intended turn at the next junction; none for a pedestrian.
+        /// Its intended turn at the next junction; none for a road user on foot.
         pub turn: Turn,
     }
 }
@@ -271,7 +272,7 @@ pub struct OutcomeFacts {
     pub sudden: bool,
     /// The obstacle ran into the side or rear of an ego vehicle that did not have to give way.
     pub struck: bool,
-    /// The road user that had to give way. Known for collisions alone.
+    /// Which of the ego vehicle and the obstacle had priority, if either. Known for collisions alone.
     pub priority: Priority,
     /// The body that was hit, if any.
     pub hit: Option<BodyWord>,

@@ -14,13 +14,13 @@ use crate::model::limits::{OFFSET_M, SPEED_MPS_MAX, out_of_bounds, rounded_into}
 use crate::model::vocabulary::{Field, LaneChoice, ShownLights, TrafficRule, Turning, Word};
 use avastra_base::units::{Dimension, decimal};
 
-/// The greatest speed that a pedestrian can be told, m/s: below a sprinter's 12 m/s.
+/// The greatest speed that a road user on foot can be told, m/s: below a sprinter's 12 m/s.
 pub(super) const ON_FOOT_MPS_MAX: f64 = 10.0;
 
 /// The greatest speed backwards that a road user can be told, m/s.
 pub(super) const BACK_MPS_MAX: f64 = ON_FOOT_MPS_MAX;
 
-/// Speeds that an order or a phase may name, m/s. [`Moves`] says which of them a road user can do.
+/// Speeds that an order or a phase may name, m/s. [`Moves`] says which of them a road user can be told.
 ///
 /// [`Moves`]: crate::model::command::Moves
 const SPEED_MPS: RangeInclusive<f64> = -BACK_MPS_MAX..=SPEED_MPS_MAX;
@@ -70,7 +70,7 @@ pub enum Kind {
     Rules,
     /// The name of a road user.
     Who,
-    /// A field that only a `spawn` has, or another manoeuvre: `check` reads it separately.
+    /// Neither of these, as a verb, a count or a manoeuvre: `check` reads the field by itself.
     Own,
 }
 
@@ -300,6 +300,13 @@ impl Fields<Term> {
 }
 
 impl Fields<Said> {
+    /// These fields alone.
+    pub fn only(&self, fields: &[Field]) -> Fields<Said> {
+        let mut only = Fields::default();
+        fields.iter().for_each(|field| only.set(*field, self.get(*field).copied()));
+        only
+    }
+
     /// The same, and this.
     #[must_use]
     pub fn with(mut self, field: Field, said: impl Into<Said>) -> Fields<Said> {

@@ -121,8 +121,8 @@ impl Space {
     }
 
     /// The memory after a step without an action. The effects of every step do not happen if they would break a rule in
-    /// force that stands for all states or orders their changes, or give a state no value. `step` is its number, `world`
-    /// the moment at which it begins. Without `world`, effects that ask about it do not happen.
+    /// force that stands for all states or orders their changes, or give a state no value. `step` is the number of the
+    /// step, `world` the moment at which it begins. Without `world`, effects that ask about it do not happen.
     pub fn memory_after_wait(
         &self,
         before: &Memory,

@@ -7,7 +7,7 @@ use crate::model::space::{COUNTED, Space};
 use crate::model::value::Memory;
 
 impl Space {
-    /// Reward of a step: the value of the first case that applies. It is 0 if none applies, or if it has no value (a
+    /// Reward of a step: the value of the first case that applies. It is 0 if none applies, or if the case has no value (a
     /// division by 0), so that neither a database nor a network meets it. `memory` holds the states after the action.
     /// `margins` holds the smallest margin of each requirement in the step (SI, NaN for a requirement that was not asked).
     pub fn reward(&self, outcome: OutcomeFacts, memory: &Memory, margins: &[f64]) -> f64 {

@@ -2,7 +2,7 @@
 //!
 //! The margin is the quantitative meaning of signal temporal logic (Fainekos and Pappas 2009, Donzé and Maler 2010). A
 //! comparison has the difference of its sides, `and` the smaller margin, `or` the larger. `recently` has the largest of the
-//! last ticks, `throughout` the smallest. Above 0 it implies that the condition holds, below 0 that it does not.
+//! last ticks, `throughout` the smallest. A margin above 0 implies that the condition holds, below 0 that it does not.
 
 use std::collections::VecDeque;
 
@@ -175,7 +175,7 @@ impl ReadyRequirement {
         self.after.is_some() || self.until.is_some() || !self.pasts.is_empty()
     }
 
-    /// The state of the requirement at a moment without a memory. `None` where it is not asked, because `when` does not
+    /// The state, at a moment, of a requirement without memory. `None` where it is not asked, because `when` does not
     /// hold or a road user that it names is not there.
     #[inline]
     pub fn at(&self, functions: &[FnDef], facts: &Facts<'_>) -> Option<Kept> {
@@ -253,7 +253,7 @@ impl ReadyRequirement {
         }
     }
 
-    /// The state of the requirement at the next tick with a memory. `None` as in [`ReadyRequirement::at`], while `after`
+    /// The state, at the next tick, of a requirement with memory. `None` as in [`ReadyRequirement::at`], while `after`
     /// does not begin to hold, and while too little is past. With `after`, the condition is also asked while it
     /// `is_awaited`.
     pub fn at_next(

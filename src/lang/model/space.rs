@@ -352,12 +352,12 @@ pub struct SpawnDef {
     pub behind: bool,
     /// The road user from which the distance is measured, in place of the ego vehicle.
     pub of: Option<Who>,
-    /// The trajectory that it follows, by index in `Space::trajectories`. The distance is then its station there, of one
-    /// that lies beside the route where that begins.
+    /// The trajectory that it follows, by index in `Space::trajectories`. The distance is then its station there; for a
+    /// trajectory beside the route, it says where that begins.
     pub trajectory: Option<WordExpr<usize>>,
     /// The parked vehicle from behind which a pedestrian steps.
     pub cover: Option<WordExpr<BodyWord>>,
-    /// The other fields of its order.
+    /// The other fields that it is told.
     pub told: Fields<Term>,
     /// The name that it bears from then on, by index in `Space::bearers`.
     pub bearer: Option<usize>,

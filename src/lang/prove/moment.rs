@@ -78,7 +78,7 @@ impl Case {
         Case { numbers, words, not_words }
     }
 
-    /// The facts that both know, and those that only one of them knows.
+    /// The facts of both together; no fact may be known to both.
     fn and(&self, other: &Case) -> Case {
         let mut both = self.clone();
         both.numbers.extend(&other.numbers);
@@ -157,7 +157,7 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
     };
     let Case { mut numbers, words, not_words } = known.case.cloned().unwrap_or_default();
     let asked = enclose(&spawn.speed, known).interval().intersect(&at_most(*SPAWN_SPEED_MPS.end()));
-    // A crossing pedestrian waits at first, and one with `Stand` waits for good.
+    // A road user that crosses on foot waits at first, and one with `Stand` stands for good.
     let speed = match verbs.iter().all(|verb| matches!(verb, Verb::Walk | Verb::Stand)) {
         true => Interval::point(Rational::ZERO),
         false => Interval { low: End::At(Rational::ZERO, true), high: asked.high },
@@ -399,7 +399,7 @@ fn range(fact: Fact, road: Option<&RoadFacts>, episode: &EpisodeDef) -> Interval
         }
         Fact::EgoRouteLeft => along(|stretch| (*stretch.route_left_m.start(), *stretch.route_left_m.end())),
         Fact::NpcLimit => road.map(|road| measured(road.map_limits_mps[0], road.map_limits_mps[1])),
-        // A pushed vehicle is no faster than the vehicle that pushes it.
+        // A pushed road user is no faster than the one that pushes it.
         Fact::NearestSpeed => road.map(|road| {
             let ambient_mps = LIMIT_PART_MAX * road.map_limits_mps[1];
             measured(0.0, SPEED_MPS_MAX.max(ambient_mps))

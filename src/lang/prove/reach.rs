@@ -548,8 +548,8 @@ struct Masked<'a> {
     roads: Vec<&'a str>,
 }
 
-/// One remark for all roads on which the same rules mask the same rows of an action, if these rows run on others. Many
-/// roads share one remark.
+/// One remark for all roads on which the same rules mask the same rows of an action, if these rows run on others. For more
+/// than [`REMARKS_MAX`] roads, one remark stands for all.
 fn report_masked(space: &Space, action: &ActionDef, left: &[&Row]) -> Vec<Diagnostic> {
     let mut found: Vec<Masked> = Vec::new();
     for (index, road) in space.roads.iter().enumerate() {

@@ -286,7 +286,7 @@ struct Met {
     since: u64,
     /// Whether the first start comes here without an action. Such states are followed however many others there are.
     is_waited_for: bool,
-    /// The states that rows lead to from here, if they do not ask for the time.
+    /// The states to which rows that do not ask for the time lead from here.
     led_to: BTreeSet<usize>,
     /// The rows, by position, that were not tried here, or that ask for the time.
     open: Vec<usize>,

@@ -322,7 +322,7 @@ impl States<'_> {
         })
     }
 
-    /// The results of the rows that set a followed cell in a state; the other rows do the same as a wait.
+    /// The moves from a state by the rows that set a followed cell; the other rows lead where a wait does.
     fn moves_of(&mut self, state: usize) -> Vec<Move> {
         let mut moves = Vec::new();
         // Other rules than those by default may enable rows that are dead by default.

@@ -324,7 +324,7 @@ impl Search<'_> {
         }
         let world = WorldFacts { spawns, ..WorldFacts::default() };
         let candidate = Candidate { values, before, after, world: Some(&world) };
-        // Conditions on the moment or the place are not judged by this world, but by whether they may come.
+        // Conditions on the moment or the place are judged by whether one that meets them may come, not by this world.
         self.rules.breaches(candidate).all(|breach| breach.asks_about_moment())
             && (!self.asks_about_moment() || self.is_left_open(candidate))
     }
@@ -445,8 +445,8 @@ pub(super) fn points(values: &[Value]) -> Vec<Values> {
 }
 
 /// The cells of a memory that an episode reaches, each as the short fraction beside it. Computed values are rounded: 0.3 -
-/// 0.1 - 0.1 is 0.09999999999999998. A draw that takes 0.1 from it has 0, because it takes them for equal. A proof that
-/// took it for exact would have less.
+/// 0.1 - 0.1 is 0.09999999999999998. A draw that takes 0.1 from that has 0, because it takes the two for equal. A proof
+/// that took the number for exact would have less.
 fn followed(memory: &Memory) -> Vec<Values> {
     let cell = |value: &Value| match value {
         Value::Number(number) => {

@@ -1,4 +1,4 @@
-//! The messages of the compiler: a code, a message, the places it is about, and what to do.
+//! The diagnostics of the compiler: a code, a message, the places it is about, and what to do.
 //!
 //! Every stage that reads source text reports through these types; only this file knows how they are drawn. Codes are never
 //! reused or renumbered. The caller decides when to stop, and with which exit status.

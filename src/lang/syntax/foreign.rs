@@ -10,7 +10,7 @@ use avastra_base::units::unit;
 #[derive(Debug)]
 pub struct Failure {
     pub at: usize,
-    /// The words expected there, as the author knows them.
+    /// The expected things there, in the author's words.
     pub expected: Vec<&'static str>,
     /// Whether an expression could have gone on there.
     pub continues: bool,
@@ -143,10 +143,10 @@ pub fn foreign_declaration(word: &str) -> Option<&'static str> {
     })
 }
 
-/// The replacement of `if … then … else …`.
+/// The advice on what replaces `if … then … else …`.
 const CHOICE: &str = "`match` chooses a value: `match near { true => 3 m, false => 9 m }`";
 
-/// The replacement of `if` and `else` in a list of cases.
+/// The advice on what replaces `if` and `else` in a list of cases.
 const CASES: &str =
     "the first case that holds counts: write `condition => value`, and `_ => value` for the rest";
 

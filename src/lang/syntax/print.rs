@@ -513,7 +513,7 @@ impl Printer<'_> {
             self.words(":");
             self.value(&item.condition);
         } else {
-            // A list too long for one line has a line for each of its entries, and for the condition.
+            // Clauses too long for one line have a line each, and the condition has one, too.
             parts.extend([Layout::text(":"), Layout::Line(" "), expression(&item.condition)]);
             self.put(&Layout::group([Layout::nest(parts)]));
         }

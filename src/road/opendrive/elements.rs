@@ -52,7 +52,7 @@ pub enum Contact {
     End,
 }
 
-/// The speed limit of a record.
+/// The speed limit that a record states, if it states one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Limit {
     /// m/s.
@@ -100,7 +100,7 @@ pub struct LaneElement {
     pub undriven: Option<LeftOut>,
     /// The rules of the lane; unknown until `cut` has found them.
     pub holds: Holds,
-    /// The use of a lane by pedestrians, if it is no driving lane.
+    /// The lane's kind for people on foot. `None` for a driving lane, and for one along which they do not walk.
     pub beside: Option<StripKind>,
     /// Width over the distance from the section's begin.
     pub widths: Cubics,
@@ -183,7 +183,7 @@ pub struct ObjectElement {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ObjectKind {
     Crosswalk,
-    /// A building, a wall or a tree, which pedestrians do not walk through.
+    /// Something solid, such as a building, a wall or a tree: nobody walks through it.
     Solid,
 }
 

@@ -80,7 +80,7 @@ impl PaymentSettings {
     }
 
     /// The reward of each step of an episode, shape `(steps,)`, where a collision that counts pays R_col at the step
-    /// that made its obstacle appear. It does not pay where it happened: that choice had no part in it.
+    /// that made its obstacle appear. The step at which it happened is not paid for it: its choice had no part.
     ///
     /// A collision whose obstacle no choice made pays where it happened.
     pub(super) fn paid_to_makers(&self, episode: &Trajectory) -> Vec<f64> {

@@ -39,7 +39,7 @@ impl Meeting {
 
     /// The least error of its arrival if the ego vehicle keeps its speed, s. It is above 0 if the road user is late
     /// even at full speed, and below 0 if it is early even if it brakes. `gains_mps2` and `loses_mps2` are the limits
-    /// of its body. `None` once the ego vehicle has not kept its speed.
+    /// of the road user's body. `None` once the ego vehicle has not kept its speed.
     fn late_s(
         &mut self,
         station_m: f64,
@@ -120,8 +120,8 @@ impl Meeting {
 }
 
 /// The acceleration now, m/s², of a body that goes over from `from_mps` to `to_mps` on this way in this time: first
-/// this one, then the opposite one. If the way is too short for that, it brakes to a stop, from which it sets out again
-/// later.
+/// this one, then an equal one against it. If the way is too short for that, it brakes to a stop, from which it sets
+/// out again later.
 fn adapting_mps2(from_mps: f64, to_mps: f64, way_m: f64, time_s: f64) -> f64 {
     let lacks_m = 2.0 * way_m - (from_mps + to_mps) * time_s;
     let more_m = (to_mps - from_mps) * time_s;

@@ -70,8 +70,7 @@ impl Running {
     /// it has no value now.
     pub fn tracked(&self, moment: &LaterMoment, moves: Moves) -> Option<Command> {
         let Tracked { course, phase, first } = self.tracked.as_ref()?;
-        let mut now = Command::default().with(Field::Speed, course.speed_mps(*phase, moment)?);
-        now.set(Field::Rate, first.get(Field::Rate).copied());
+        let now = first.only(&[Field::Rate]).with(Field::Speed, course.speed_mps(*phase, moment)?);
         Some(now.for_who(moves))
     }
 

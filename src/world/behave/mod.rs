@@ -1,4 +1,5 @@
-//! The next moves of road users: drivers, pedestrians, followers of a trajectory, manoeuvres, and the right of way.
+//! The next moves of road users: drivers, pedestrians and animals, followers of a trajectory, manoeuvres, and the
+//! right of way.
 
 pub mod guided;
 pub mod manoeuvre;

@@ -154,7 +154,7 @@ impl Walker {
         if around.tick < self.begins_tick {
             return Some(Moved::at_rest(this));
         }
-        // A pedestrian ordered to go waits for obstacles in the way, and does not turn round by itself.
+        // One that was ordered to go waits for whatever is in the way, and does not turn round by itself.
         if self.is_told && self.pace_mps == 0.0 {
             return Some(Moved::at_rest(this));
         }
@@ -244,7 +244,7 @@ impl Walker {
     }
 }
 
-/// Whether an obstacle stands or passes right before the feet of a pedestrian at a pose.
+/// Whether the ego vehicle or another road user stands or passes right before the feet of one on foot at a pose.
 pub fn is_blocked(pose: Pose, this: &Obstacle, around: &Around) -> bool {
     let next = OrientedBox { pose: pose.offset(STEP_M, 0.0), ..this.outline };
     around.others().any(|Other { outline, elevation_m, .. }| {

@@ -103,7 +103,7 @@ impl Mover {
                 moved
             }
             Motion::Walk(_) | Motion::Stroll(_) if self.touched => Some(rest),
-            // A road user with an order still to carry out does not leave.
+            // A road user whose manoeuvre is not over does not leave.
             Motion::Walk(walker) => walker.step(this, in_sight || self.course.is_some(), around),
             Motion::Stroll(stroller) => stroller.step(this, in_sight || self.course.is_some(), around),
             Motion::Guide(guided) => {

@@ -13,7 +13,7 @@ use crate::state::stroller::Stroller;
 use crate::state::time::{DT_S, FRAME_TICKS};
 use crate::view::around::Around;
 
-/// Lateral speed of a pedestrian whose order has no `aside`, m/s: an adult's walking pace. Ours.
+/// Lateral speed of a pedestrian or an animal whose order has no `aside`, m/s: an adult's walking pace. Ours.
 const ASIDE_MPS: f64 = 1.2;
 
 impl Stroller {

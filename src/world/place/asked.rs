@@ -1,4 +1,4 @@
-//! The request of a moment, and the steps that the verbs share to make its road user appear.
+//! A request for a road user at a moment, and the steps that the verbs share to make it appear.
 
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ pub const ROOM_M: f64 = 0.5;
 /// A road user on a trajectory stands exactly where it was put: Euro NCAP parks cars 0.2 m apart.
 pub const GUIDED_ROOM_M: f64 = 0.05;
 
-/// The request of a moment: which road user shall appear, of which size, and with which id.
+/// A request at a moment: which road user shall appear, of which size, and with which id.
 pub struct Asked<'a> {
     pub around: &'a Around<'a>,
     pub arrivals: &'a Arrivals,

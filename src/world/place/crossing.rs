@@ -1,5 +1,5 @@
-//! Crossing traffic: a rendezvous with the ego vehicle at a conflict of its route, on a leg whose signal will be green.
-//! Or a vehicle that stands at the line of such a leg.
+//! Crossing traffic: a rendezvous with the ego vehicle at a conflict of its route, on a leg whose signal will be
+//! green; or a vehicle that stands at the line of a crossing leg.
 
 use avastra_lang::model::vocabulary::{Side, Then, TrafficRule};
 use avastra_road::{Conflict, LaneIndex, StopLine};

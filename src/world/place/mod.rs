@@ -124,15 +124,15 @@ fn check(request: &SpawnRequest) -> Result<(), String> {
 
 /// The distances that rules ask for.
 ///
-/// The gap at the spawn is between the outlines. The safety gap is what a careful driver needs (see `view::safety`).
-/// The driver slows down to a vehicle ahead, or stops for a newcomer that crosses, walks or stands. For a newcomer from
-/// behind it is what the newcomer needs to slow down to the ego vehicle. An oncoming vehicle stays in its own lanes and
-/// needs none. It needs one if its way crosses the route at a junction, or if it appears at an offset from the middle
-/// of its lane, towards the ego vehicle.
+/// The gap at the spawn is between the outlines. The safety gap is the room that a careful driver needs (see
+/// `view::safety`) to slow down to a newcomer ahead, or to stop for one that crosses, walks or stands. For a newcomer
+/// from behind it is the room that the newcomer needs to slow down to the ego vehicle. An oncoming vehicle stays in
+/// its own lanes and needs none, unless its way crosses the route at a junction or it appears at an offset from the
+/// middle of its lane, towards the ego vehicle.
 ///
-/// A newcomer is in plain view if it is not behind, and not hidden by others, fog or distance. It then needs at least
-/// the way that the ego vehicle drives while a careful driver perceives and reacts, even if it would be no danger: it
-/// must not seem to come from nowhere.
+/// A newcomer is in plain view if it does not come from behind, and is not hidden by others, fog or distance. Its
+/// safety gap is then at least the way that the ego vehicle drives while a careful driver perceives and reacts, even
+/// if it would be no danger: it must not seem to come from nowhere.
 ///
 /// A parked vehicle that appears with a pedestrian is nearer than the pedestrian, and the gap is measured to the
 /// vehicle. So both appear where a careful driver could still stop.

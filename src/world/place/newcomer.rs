@@ -7,8 +7,7 @@ use avastra_base::geometry::{OrientedBox, distance_m};
 use avastra_lang::model::vocabulary::{Body, Colour, ShownLights, Verb};
 use avastra_road::is_apart;
 
-/// Pedestrians, animals and things walk or stand beside this stretch of the ego vehicle's route, before and behind it,
-/// m.
+/// Whatever walks or stands is beside this stretch of the ego vehicle's route, before and behind it, m.
 const ON_FOOT_M: f64 = 200.0;
 
 impl RoadUser {

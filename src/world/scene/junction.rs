@@ -1,5 +1,5 @@
-//! Conflict areas: the parts of a junction's lanes on which two vehicles would be in each other's way. For each, the
-//! lane that goes first.
+//! Conflict areas: the parts of a junction's lanes on which two vehicles would be in each other's way, and which of
+//! the two lanes goes first.
 //!
 //! Made once for a map from its lanes alone. Where the way of another vehicle passes through the area,
 //! and when, is for the drivers to judge (see `manners`). Lanes that leave the same lane are no
@@ -138,8 +138,8 @@ pub(crate) enum Order {
 /// Otherwise the vehicle from the right goes first (Vienna Convention, article 18; so in Estonia and California).
 ///
 /// If both come from the same side, the one that turns less goes first. A circle or a bend that both come round is no
-/// turn ([`turns_rad`]). If they turn equally, a vehicle that turns across the road yields; otherwise the lane that the
-/// file names first goes first.
+/// turn ([`turns_rad`]). If they turn alike (within [`ALIKE_RAD`]), a vehicle that turns across the road yields;
+/// otherwise the lane that the file names first goes first.
 pub(crate) fn order(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> (bool, Order) {
     let (signs_a, signs_b) = (map.lane(a).precedence, map.lane(b).precedence);
     if signs_a != signs_b {

@@ -42,7 +42,7 @@ pub(crate) fn opposing_lane(scene: &Scene, lane: LaneIndex, station_m: f64) -> R
 /// The lane that `pick` finds for the lane of the route at a station.
 ///
 /// Inside junctions lanes have few neighbours. There the result is the lane that joins the lanes found by `pick` for
-/// the streets before and after. `forward` is in the direction of the route, otherwise against it.
+/// the streets before and after. It joins them in the direction of the route (`forward`) or against it.
 pub(crate) fn lane_along(
     scene: &Scene,
     station_m: f64,

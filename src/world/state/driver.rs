@@ -66,7 +66,7 @@ pub struct Driver {
     pub ignores: IgnoredRules,
     /// Whether it is an emergency vehicle under way: it passes lights and signs, and all others wait for it.
     pub has_siren: bool,
-    /// Its order relative to the ego vehicle. It says the speed, in place of `cruise_mps`.
+    /// Its order relative to the ego vehicle or another road user. The order sets the speed, in place of `cruise_mps`.
     pub pursuit: Option<Box<Pursuit>>,
     /// By how much it missed the moment of its last `early`, s; below 0 if it was too soon.
     pub late_s: Option<f64>,

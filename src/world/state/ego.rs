@@ -67,7 +67,7 @@ impl VehicleParameters {
 #[derive(Debug, Clone)]
 pub struct Ego {
     pub motion: EgoMotion,
-    /// The throttle's output after its lag, %.
+    /// The output of the pedals, throttle and brake, after their lag, %.
     pub throttle_pct: f64,
     pub brake_pct: f64,
     /// These two follow from the pose, and are kept because they are asked for so often.

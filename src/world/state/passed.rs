@@ -5,7 +5,7 @@ use avastra_road::{LaneIndex, RoadMap, SignKind};
 
 use crate::state::trace::traced;
 
-/// The colour of a light as a vehicle passed it.
+/// The state of a light as a vehicle passed it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shown {
     Free,

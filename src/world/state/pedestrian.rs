@@ -1,4 +1,4 @@
-//! A pedestrian who crosses the road.
+//! A pedestrian or an animal that crosses the road.
 
 use avastra_base::geometry::{Pose, Vec2};
 

@@ -2,8 +2,8 @@
 
 use avastra_lang::model::vocabulary::Priority;
 
-/// The rules by which priority is decided. Articles are those of the Vienna Convention on Road Traffic (1968). "Of the
-/// signs" means the Convention on Road Signs and Signals of the same year.
+/// The rules by which priority is decided. Articles are those of the Vienna Convention on Road Traffic (1968). In the
+/// texts, "of the signs" means the Convention on Road Signs and Signals of the same year.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rule {
     /// Neither came into the other's way by any of these rules.
@@ -110,7 +110,7 @@ impl Rule {
     }
 }
 
-/// The road user whose motion decided: it came into the other's way.
+/// Whose motion decided: the ego vehicle, the other or both came into the other's way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mover {
     Ego,

@@ -1,4 +1,4 @@
-//! A pedestrian who walks along the road.
+//! A pedestrian or an animal that walks along the road.
 
 use crate::state::trace::traced;
 

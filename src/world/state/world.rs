@@ -118,7 +118,7 @@ pub struct World {
     /// Seed of the choices of other road users, and that of when they look.
     pub(crate) seed: u64,
     pub(crate) reactions: u64,
-    // The contacts of the last tick. No later tick reads it.
+    // The contacts and incidents of the last tick. No later tick reads them.
     pub(crate) contacts: Vec<Contact>,
     pub(crate) incidents: Vec<Incident>,
     /// The clocks of the lights before orders moved them, and up to which tick each counted: what was shown in the past. No tick
@@ -206,8 +206,8 @@ impl World {
         user.map_or(PhaseCount::default(), |user| user.mover.phases)
     }
 
-    /// The phase that the road user with an id is in. It has its manoeuvre, by its index in the space, its number from
-    /// 1, and the tick in which it began.
+    /// The phase that the road user with an id is in: the index of its manoeuvre in the space, the phase's number from
+    /// 1, and the tick in which the phase began.
     pub fn phase(&self, id: u32) -> Option<(usize, u32, u64)> {
         let user = self.user(id)?;
         user.mover.course.as_ref()?.under_way()
@@ -263,8 +263,8 @@ impl World {
         self.ego_front_m() >= self.scene.route.goal_m - 1.0
     }
 
-    /// Whether the ego vehicle is in a junction that it was not allowed to enter. It entered at red, late at yellow, or
-    /// past a stop sign without having stood.
+    /// Whether the ego vehicle is in a junction that it was not allowed to enter: at red, late at yellow, or past a
+    /// stop sign without having stood.
     pub fn ego_runs_signal(&self) -> bool {
         self.ego_passed.is_running_signal(&self.scene.map, &self.ego.outline)
     }

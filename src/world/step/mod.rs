@@ -104,7 +104,8 @@ impl World {
     ///
     /// An obstacle that the ego vehicle touched once brakes to rest and touches it no more. Two obstacles that touch
     /// each other slide to rest (see [`World::incidents`]). A wreck leaves when it has stood for 2 s and the ego
-    /// vehicle does not see it. A driver that waited for others for 20 s leaves under the same condition.
+    /// vehicle does not see it. A driver that waited for others for 20 s also leaves once the ego vehicle does not see
+    /// it.
     pub fn tick(&mut self, control: &Control) -> &[Contact] {
         self.contacts.clear();
         self.incidents.clear();

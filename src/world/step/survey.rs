@@ -1,4 +1,4 @@
-//! The questions of drawing to a world: the facts of its moment, and where spawns would be put.
+//! The questions that drawing asks a world: the facts of its moment, and where spawns would be put.
 
 use std::cell::OnceCell;
 

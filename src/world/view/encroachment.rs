@@ -22,7 +22,7 @@ pub struct Encroachment {
 type Trail = VecDeque<OrientedBox>;
 
 impl Encroachment {
-    /// Notes the places of all road users. To be called at every tick.
+    /// Notes the places of the ego vehicle and of all road users. To be called at every tick.
     pub fn note(&mut self, world: &World) {
         add(&mut self.ego, &world.ego_outline());
         self.others.retain(|(id, _)| world.obstacle(*id).is_some());

@@ -1,8 +1,8 @@
 //! The input of the ego vehicle's sensors: the truth, cut down to their range. Hidden objects are not left out: each
 //! object says how much of it is in sight.
 //!
-//! This is the physical side of sensing (line of sight, light, weather). The module `ads` makes from it the view of a
-//! driving system, with its errors and delays.
+//! This is the physical side of sensing (line of sight, light, weather). A driving system's own picture of it, with
+//! its errors and delays, belongs to `ads`.
 
 use avastra_base::geometry::{Frame, OrientedBox, Vec2, larger};
 

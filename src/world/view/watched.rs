@@ -1,5 +1,5 @@
-//! Facts for requirements beside the moment. Some must be watched from tick to tick, and some cost too much to be
-//! looked up where no requirement needs them.
+//! Facts that requirements may ask for beside those of the moment. Some must be watched from tick to tick, and some
+//! cost too much to be looked up where no requirement needs them.
 
 use std::collections::VecDeque;
 

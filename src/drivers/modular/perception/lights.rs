@@ -1,9 +1,9 @@
 //! The colours of traffic lights, as far as they can be read.
 //!
 //! A light is read within the camera's range and the meteorological optical range, where no tall vehicle
-//! stands in the line of sight from the roof to the lamp. The colour holds for a while after the light goes
-//! out of sight. A colour that is read is right: the facts at hand give no rate of confusion. Backlight is
-//! left out because the world has no azimuth of the sun; darkness costs nothing because lamps shine.
+//! stands in the line of sight from the roof to the lamp. The colour last read is held for a while after the
+//! light goes out of sight. A colour that is read is right: the facts at hand give no rate of confusion. Backlight
+//! is left out because the world has no azimuth of the sun; darkness costs nothing because lamps shine.
 
 use std::sync::Arc;
 

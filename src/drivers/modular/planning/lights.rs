@@ -2,9 +2,9 @@
 //!
 //! A light that would need harder braking than `red_light_mps2_max` is passed for as long as it would (Apollo's
 //! traffic-light rule, weakness `late_red_passed`). A stop once decided holds until the light is green, also for a
-//! vehicle that has come to rest beyond the line, unless it is in the junction already. If it needs it, the vehicle
-//! brakes for it as hard as in an emergency. Once it stands at the line it stays where it is, whatever its position
-//! seems to be. A light whose colour is not known is taken for red, as in Apollo.
+//! vehicle that has come to rest beyond the line, unless it is in the junction already. If the stop needs it, the
+//! vehicle brakes as hard as in an emergency. Once it stands at the line it stays where it is, whatever its
+//! position seems to be. A light whose colour is not known is taken for red, as in Apollo.
 
 use std::sync::Arc;
 

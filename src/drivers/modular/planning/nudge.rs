@@ -36,8 +36,8 @@ pub struct LateralPlan {
     bump: Option<Bump>,
     /// All that is passed, the first of them first.
     row: Vec<u32>,
-    /// Objects that reach into the shifted way now, because they moved or were not where they seemed: the
-    /// vehicle stops for them.
+    /// Objects of the row that reach into the shifted way now, because they have moved or were not where they
+    /// seemed: the vehicle stops for them.
     met: Vec<u32>,
     way_back: Option<WayBack>,
 }
@@ -152,7 +152,7 @@ impl LateralPlan {
         self.bump.is_some() && self.row.contains(&id) && !self.met.contains(&id)
     }
 
-    /// The object that is being passed, and where it stands.
+    /// What is being passed: the id of the first object, and the stretch of the guide that the whole row takes.
     pub fn passing(&self) -> Option<(u32, Span)> {
         self.bump.filter(|bump| !self.met.contains(&bump.id)).map(|bump| (bump.id, bump.span))
     }

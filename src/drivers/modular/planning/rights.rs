@@ -1,10 +1,9 @@
-//! The lanes whose vehicles must let the ego vehicle go first, where they meet its route in junctions.
+//! Right of way where other lanes meet the ego vehicle's route in junctions: whether a road user must let it go first.
 //!
 //! From the map alone: lights that are never green together, signs, and the order of the lanes
 //! (`sim::right_of_way`). It is asked only about futures that an object may have: one that would break the ego
-//! vehicle's right of way binds the plan only if it is the more probable one. A probable future binds a
-//! vehicle that has priority, too: a driving system that insists on its right is no better than one that
-//! forgets it.
+//! vehicle's right of way binds the plan only if it is the more probable one. A probable future binds the plan
+//! whoever has priority: a driving system that insists on its right is no better than one that forgets it.
 
 use avastra_lang::model::vocabulary::Priority;
 use avastra_road::LaneIndex;

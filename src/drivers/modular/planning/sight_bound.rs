@@ -58,7 +58,7 @@ pub struct SightBound {
     prior: Vec<PriorLane>,
     /// The sensors as the planner is told of them, without planted faults.
     sensors: PerceptionConfig,
-    /// Pedestrians are banned from motorways (Vienna Convention on Road Traffic, article 25).
+    /// Whether the road is a motorway: nobody is expected on foot there (Vienna Convention on Road Traffic, article 25).
     is_motorway: bool,
     /// The conditions that the ranges were worked out for, and these.
     known: Option<(Conditions, Seen)>,

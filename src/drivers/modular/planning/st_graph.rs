@@ -5,9 +5,9 @@
 //! not driven. It is compared with every region, and gives the decision about each road user: below a region
 //! the vehicle stays behind, above it passes before. The law in `speed` then drives the decisions.
 //!
-//! Ours: rows of 2 m (Apollo: 0.1 to 1 m), because decisions alone are read off. Ours, too: the costs near
-//! the limits of acceleration, which four possible accelerations do not need. Hypotheses that are too
-//! improbable to bind count in the cost, weighted with their probability.
+//! Ours: rows of 2 m (Apollo: 0.1 to 1 m), because decisions alone are read off; and hypotheses that are too
+//! improbable to bind count in the cost, weighted with their probability. Left out are Apollo's costs near the
+//! limits of acceleration: the four possible accelerations do not need them.
 
 use crate::kit::Guide;
 use avastra_base::geometry::{larger, smaller};

@@ -3,7 +3,7 @@
 //! UN R157, Annex 4, Appendix 3 (Annex 3 from Supplement 1 on). A vehicle that leaves the middle of its lane
 //! by more than drivers wander (0.375 m) is evaluated for 0.4 s. 0.75 s later the foot is on the brake, which
 //! reaches 0.774 g within 0.6 s (jerk 12.65 m/s³). Meanwhile the released accelerator gives 0.4 m/s² (esmini
-//! and JRC-FSM; the regulation's table has none). It is critical at a time to collision of at most 2 s, and a
+//! and JRC-FSM; the regulation's table has none). A vehicle is critical at a time to collision of at most 2 s, and a
 //! vehicle ahead that brakes hard, or that a cut-out has uncovered, at a time headway below 2 s.
 //!
 //! The model knows vehicles of the ego vehicle's direction only. Beyond it, a road user that will be on

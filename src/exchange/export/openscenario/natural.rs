@@ -1,8 +1,8 @@
 //! Other road users as a person would write them: where they begin, how fast, when they change speed and lane, which way
 //! they take at junctions.
 //!
-//! Road users that follow a trajectory from the start are written as they are told ([`as_told`]). For others it is an
-//! approximation (`pace` and `lanes` say how near), for players whose ego vehicle drives otherwise than the recorded one.
+//! Road users that follow a trajectory from the start are written as they are told ([`as_told`]). Others are approximated
+//! (`pace` and `lanes` say how near), for players whose ego vehicle drives otherwise than the recorded one.
 //! A pedestrian that set out as the ego vehicle came near does so when it comes as near. A road user that the ego vehicle
 //! hit stops when it is hit.
 

@@ -9,7 +9,7 @@ pub const SPEED_MPS: f64 = 0.5;
 pub const WAY_M: f64 = 0.25;
 /// The longest piece, in ticks: 20 s. It bounds the search.
 const PIECE_TICKS_MAX: usize = 1000;
-/// A slower road user stands, m/s.
+/// A road user that is slower than this stands, m/s.
 const REST_MPS: f64 = 0.05;
 /// Speeds are written to this, m/s.
 const ROUNDED_MPS: f64 = 0.01;

@@ -1,4 +1,5 @@
-//! The conditions of a phase as conditions of OpenSCENARIO: comparisons whose sides are sums of the compared facts.
+//! The conditions that a phase waits for, as conditions of OpenSCENARIO: comparisons whose sides are sums of the compared
+//! facts.
 //!
 //! A distance has a sign in avastra, and none in OpenSCENARIO. So less than a gap is written for a first phase alone,
 //! which comes when the gap first closes. More than a gap is written where both orders of the two are asked for.

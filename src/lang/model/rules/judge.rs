@@ -232,7 +232,7 @@ impl<'a> RowRules<'a> {
             }
             other => self.space.show(other, expr.ty),
         };
-        // Computed values lose the digits that binary fractions leave; measured values have a thousandth of their unit.
+        // Computed values lose the digits that binary fractions leave; measured ones are rounded to a thousandth of a unit.
         let value = |expr: &Expr| to(1e9, expr);
         let measured = |expr: &Expr| to(1e3, expr);
         let is_known = |expr: &Expr| evaluate(expr, &self.space.functions, &facts).number().is_finite();

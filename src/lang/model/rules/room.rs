@@ -7,7 +7,7 @@ const GRID: f64 = 1.0 / 64.0;
 /// else have three values.
 const FEWEST_STEPS: f64 = 8.0;
 
-/// The rest of a range: parts in rising order that do not touch.
+/// The parts of a range that are left, in rising order; they do not touch.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Room {
     parts: Vec<Part>,

@@ -2,8 +2,7 @@
 //!
 //! The room of a number is found by trying. Between two neighbouring places where a clause may change (`critical`), every
 //! clause holds everywhere or nowhere. Only a part of 1e-9 beside the place differs, where numbers count as equal. So one
-//! try in between and one at each place decide. A try is judged
-//! as drawing and replaying judge ([`RowRules::breaches`]).
+//! try in between and one at each place decide. A try is judged as drawing and replaying judge ([`RowRules::breaches`]).
 //!
 //! 1. Forwards: each parameter gets what the clauses leave that no later parameter decides. That is nearly always
 //!    enough, and cheap.
@@ -11,8 +10,8 @@
 //!    only the values that leave values to all later ones. The places where that may change come from polynomials
 //!    without the later numbers (`polynomial::project`).
 //!
-//! Both draw from the same values with the same shares: where the first way fails, the second draws again. Its remaining
-//! values after choices from lists are kept for further draws: there are few of them, and they come again.
+//! Both draw from the same values with the same shares: where the first way fails, the second draws again. The values
+//! that it leaves after choices from lists are kept for further draws: there are few such choices, and they come again.
 
 use std::borrow::Cow;
 use std::cell::Cell;

@@ -75,7 +75,7 @@ impl Reader {
             _ => None,
         };
         let undriven = undriven.map(|what| LeftOut { what, for_vehicles });
-        // Lanes that are not for vehicles are left out without a warning.
+        // Lanes beside those for driving, as for parking, cycles or walking, are left out without a warning.
         if let Some(LeftOut { what, for_vehicles: true }) = &undriven {
             self.ignore(format!("lanes {what}"));
         }
@@ -152,9 +152,9 @@ impl Reader {
     }
 }
 
-/// The use of a type of lane: whether vehicles drive on it in one direction, whether some kinds may, and its use by
-/// pedestrians where no car drives on it. The last is `None` for verges and medians, where pedestrians may stand but do
-/// not walk along.
+/// The use of a type of lane: whether vehicles drive on it in one direction, whether some kinds of vehicle may, and its
+/// kind for people on foot where no car drives on it. The last is `None` for verges and medians, on which people may
+/// stand but along which they do not walk.
 fn lane_type(kind: &str) -> (bool, bool, Option<StripKind>) {
     match kind {
         "driving" | "entry" | "exit" | "onRamp" | "offRamp" | "connectingRamp" | "slipLane" | "mwyEntry"

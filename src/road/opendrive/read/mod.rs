@@ -55,7 +55,7 @@ pub fn well_formed(text: &str) -> Result<roxmltree::Document<'_>, RoadError> {
     parsed.map_err(|error| not_xml(text, &error))
 }
 
-/// Where a document type with internal declarations begins, which may let a short text stand for a long one.
+/// Where a document type begins that has internal declarations: they may let a short text stand for a long one.
 fn declaring_type(text: &str) -> Option<usize> {
     let declares = |(begin, _): &(usize, &str)| {
         let mut quote = None;

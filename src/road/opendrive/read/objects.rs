@@ -6,7 +6,7 @@ use super::super::elements::{ObjectElement, ObjectKind, Outline};
 use super::super::xml::Element;
 use super::{ROAD_M_MAX, Reader};
 
-/// An object that begins this high above the road is no obstacle, m.
+/// An object that begins at least this high above the road is in nobody's way, m.
 const ABOVE_M: f64 = 3.0;
 
 /// Limit on the copies of one crosswalk.

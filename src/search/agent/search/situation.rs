@@ -1,4 +1,4 @@
-//! A coarse view of a moment: to a search, moments with the same number are the same. All bounds are ours.
+//! A coarse view of a moment: a search does not tell moments with the same number apart. All bounds are ours.
 
 use crate::mdp::Observation;
 

@@ -139,7 +139,7 @@ fn offered(table: &ActionTable, episodes: u64) -> Vec<Result<Draw, Refusal>> {
     (0..episodes).map(offer).collect()
 }
 
-/// The allowed distances change where the distance's magnitude, or the smaller of two distances, changes.
+/// A rule about a magnitude, or about the smaller of two distances, bounds the distances that are drawn.
 #[test]
 fn draws_keep_to_rules_about_magnitudes_and_the_least() {
     for (rule, is_kept) in [

@@ -76,8 +76,8 @@ impl Driver {
         meant.is_ok_and(|meant| meant == self.way.lane_at(self.station_m).0)
     }
 
-    /// Begins a change to the next lane on the way to the wanted one, if the road and others leave the place. Returns
-    /// whether the vehicle is in the wanted lane already.
+    /// Begins a change to the next lane on the way to the wanted one, if the road and others leave room for it.
+    /// Returns whether the vehicle is in the wanted lane already.
     fn go_over(&mut self, lane: LaneChoice, told: Option<AsideBy>, view: &View) -> bool {
         let View { this, around, .. } = *view;
         // An error: in a junction, or where that lane has not begun yet.

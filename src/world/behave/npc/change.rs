@@ -32,11 +32,12 @@ use avastra_lang::model::body::BodyParameters;
 /// beside the corner of the front.
 const SPHERE_PART: f64 = 0.75;
 const SPHERE_M_MAX: f64 = 1.2;
-/// After an aborted change at the limit of the grip, the move back may need this many times the grip. Ours.
+/// After an aborted change at the limit of the grip, the change and the move back together may need this many times
+/// the grip. Ours.
 const GRIP_MORE: f64 = 1.1;
-/// The move back takes at most this many times its own duration.
+/// The move back takes at most about this many times as long as it would by itself.
 const LED_BACK_MAX: f64 = 8.0;
-/// Places at which the two are looked at together.
+/// Parts of the move back at which it and the aborted change are looked at together.
 const BENDS: u32 = 50;
 /// Headway to another vehicle that changes into the same lane, s. Ours.
 const MERGE_S: f64 = 1.0;
@@ -69,7 +70,7 @@ impl BrokenOff {
 pub enum Whose {
     /// The driver's own: it leaves others room.
     Own,
-    /// It was told to, and perhaps how. Then it begins as soon as the lane beside it is free.
+    /// It was told to, and perhaps how. Then it begins as soon as no road user is beside it.
     Told(Option<AsideBy>),
 }
 
@@ -277,8 +278,8 @@ impl Driver {
     /// is where its centre was.
     pub fn advance_change(&mut self, way_m: f64, before: Vec2, size: &BodyParameters) -> Moved {
         let (from, wheelbase) = body_at(&self.way.path, self.station_m, size);
-        // The velocity is measured. In a bend the centre of a body is slower than its way, and between two lanes it has
-        // neither lane's speed.
+        // The velocity is measured, because in a bend the centre of a body is slower than its way, and between two
+        // lanes it has neither lane's speed.
         let at = |pose: Pose, lane_heading_rad| Moved {
             pose,
             forward: if pose.heading_rad == from.heading_rad { wheelbase.forward } else { pose.forward() },

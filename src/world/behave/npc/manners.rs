@@ -18,9 +18,9 @@
 //! **Commanded vehicles and the ego vehicle.** A vehicle that an action made appear keeps these manners towards all
 //! other vehicles. It never yields to the ego vehicle at a junction: its verb means to cross or to turn before it. It
 //! follows, brakes for and does not push an ego vehicle that is ahead of it. Ambient vehicles yield to the ego vehicle
-//! as to all others. They expect that it will not stop whenever it moves and no red light holds it. Vehicles of a
-//! traffic profile that takes its right expect that it stops where they go first, and that it has not passed a red
-//! light.
+//! as to all others. Whenever the ego vehicle moves and no red light holds it, they expect that it will not stop.
+//! Under a traffic profile whose vehicles take their right, they expect that the ego vehicle stops where they go
+//! first, and that it has not passed a red light.
 
 use core::cell::LazyCell;
 
@@ -180,8 +180,8 @@ impl Driver {
             });
         let for_ego = || {
             let other = ego_passage(area, around);
-            // A vehicle that takes its right waits for an ego vehicle without right of way only where that is in its
-            // way already.
+            // A vehicle that takes its right waits for an ego vehicle without right of way only where the ego vehicle
+            // is in its way already.
             let is_wronged = || around.traffic.takes_right && (area.goes_first || around.ego_runs_red());
             let other = other.filter(|other| other.in_m <= 0.0 || !is_wronged());
             other.is_some_and(|other| waits(&own, &other, area.goes_first, impatient))

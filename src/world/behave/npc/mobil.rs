@@ -1,12 +1,12 @@
 //! Lane changes for a driver's own gain: the model MOBIL.
 //!
-//! After Kesting, Treiber and Helbing (2007). A driver changes lanes if its own gain in acceleration, and a part of
-//! both followers' gain or loss (`politeness`), is more than a threshold. The threshold is lower to the right than to
-//! the left. Accelerations are those of the Intelligent Driver Model before and after the change. A driver takes
+//! After Kesting, Treiber and Helbing (2007). A driver changes lanes if its own gain in acceleration plus a part
+//! (`politeness`) of both followers' gain or loss is more than a threshold. The threshold is lower to the right than
+//! to the left. Accelerations are those of the Intelligent Driver Model before and after the change. A driver takes
 //! followers for drivers like itself. Only ambient vehicles change lanes so; commanded ones do what their verb says.
-//! For both a change must be safe (`change`). MOBIL's criterion, that no follower has to brake harder than `b_safe`, is
-//! kept by its kinematics. The model's own braking behind a vehicle that has just cut in comes from the wanted gap
-//! rather than from danger (Kesting, Treiber and Helbing 2010).
+//! For both a change must be safe (`change`). MOBIL's criterion, that no follower has to brake harder than `b_safe`,
+//! is kept by that kinematic check. The reason: the model's own braking behind a vehicle that has just cut in comes
+//! from the wanted gap rather than from danger (Kesting, Treiber and Helbing 2010).
 
 use avastra_base::geometry::Path;
 use avastra_lang::model::vocabulary::Side;

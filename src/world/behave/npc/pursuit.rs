@@ -1,7 +1,7 @@
-//! Orders to drivers relative to another road user. Either a driver keeps a gap, ahead or behind, to the ego vehicle or
-//! to a road user. Or it reaches a place a set time before the ego vehicle. Both say the speed, from tick to tick, as
-//! OpenSCENARIO's continuous `LongitudinalDistanceAction` and its `SynchronizeAction` do. Lights, bends and others may
-//! still make a vehicle slower.
+//! Orders to drivers relative to another road user. A driver keeps a gap, ahead or behind, to the ego vehicle or to a
+//! road user, or it reaches a place a set time before the ego vehicle. Both orders set the speed, from tick to tick,
+//! as OpenSCENARIO's continuous `LongitudinalDistanceAction` and its `SynchronizeAction` do. Lights, bends and others
+//! may still make a vehicle slower.
 
 use avastra_base::kinematics::{STANDING_MPS, braking_m, needed_mps2};
 

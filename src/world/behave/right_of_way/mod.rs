@@ -17,19 +17,19 @@
 //! A vehicle is judged by its motion, whichever word told it so: a lane change, an offset, and a trajectory that lead
 //! the same way get the same verdict. `Ruling` names the rule, its moment, and whose motion decided.
 //!
-//! To give way means not to make the other change its speed or direction *abruptly* (article 1). So the moment counts
-//! when the first of the two comes into the other's way. A vehicle that then leaves the other room to brake gently has
-//! given way, and has from now on priority over it. A vehicle that is in a junction may clear it (18.6), and a vehicle
-//! that follows keeps its distance (13.5). That both make a priority is ours. UN R79 says for lane changes what is
-//! abrupt: more than 3 m/s² after 0.4 s, to stay the way of a second behind. So a vehicle that cuts in and stops before
-//! the one behind it has its distance back, or could have stopped, has not given way. A vehicle that waits in a
-//! junction beside the other's way and then sets out comes anew. A vehicle that passed red, late yellow or its stop
-//! sign has not given way, however early it came. If that was the other vehicle, and the ego vehicle had time to brake,
-//! neither has priority.
+//! To give way means not to make the other change its speed or direction *abruptly* (article 1). So the moment at
+//! which the first of the two comes into the other's way is what counts. A vehicle that then leaves the other room to
+//! brake gently has given way, and has from now on priority over it. A vehicle that is in a junction may clear it
+//! (18.6), and a vehicle that follows keeps its distance (13.5). That both make a priority is ours. UN R79 says for
+//! lane changes what is abrupt: more than 3 m/s² after 0.4 s, to stay the way of a second behind. So a vehicle that
+//! cuts in and stops before the one behind it has its distance back, or could have stopped, has not given way. A
+//! vehicle that waits in a junction beside the other's way and then sets out comes anew. A vehicle that passed red,
+//! late yellow or its stop sign has not given way, however early it came. If that was the other vehicle, and the ego
+//! vehicle had time to brake, neither has priority.
 //!
 //! A vehicle that stands has priority in two cases, wherever it stands and looks (13.1). Either the ego vehicle saw it
-//! stand while it could brake gently for it, or it came with room. If it then moves by a step, neither has. An ego
-//! vehicle that stands has stopped already.
+//! stand while the ego vehicle could still brake gently for it, or the standing vehicle came with room. If it then
+//! moves by a step, neither has. An ego vehicle that stands has stopped already.
 //!
 //! A vehicle that has crashed is an obstacle: whoever drives must be able to stop for what can be foreseen (13.1).
 //! It has priority, unless it came to lie in the ego vehicle's way too late to brake gently for it; then neither has.

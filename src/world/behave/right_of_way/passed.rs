@@ -160,7 +160,7 @@ pub fn by_stops(
     }
 }
 
-/// The colour that a light shows a vehicle that passes it now.
+/// The state of a light for a vehicle that passes it now.
 fn shown(signal: usize, speed_mps: f64, around: &Around) -> Shown {
     let map = &around.scene.map;
     match around.colours[signal] {
