@@ -98,7 +98,7 @@ fn mark(name: &str, unit: &str, measure: impl FnOnce() -> f64) {
 /// The 45-action space, from text to table, maps included.
 fn load() -> Arc<Space> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/avastra45.ava");
-    let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
+    let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string()));
     avastra::check::load(&path, &read).expect("it is shipped").space.expect("the shipped space is sound")
 }
 
@@ -138,7 +138,7 @@ struct Shipped;
 
 impl Files for Shipped {
     fn read(&self, path: &Path) -> Result<String, ReadError> {
-        std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()))
+        std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string()))
     }
 
     fn below(&self, _: &Path) -> Vec<PathBuf> {

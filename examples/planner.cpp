@@ -4,7 +4,7 @@
 //   avastra ads check --ads ./planner
 //   avastra run scenarios/avastra45.ava --ads ./planner
 //
-// PROTOCOL.md describes the messages. This program answers with accelerations, so avastra steers along the route. It
+// docs/reference/protocol.md describes the messages. This program answers with accelerations, so avastra steers along the route. It
 // reads numbers out of the text of a message by the names of their fields; a real planner would use a JSON library.
 
 #include <algorithm>

@@ -6,7 +6,7 @@
 //! avastra ads check --ads target/debug/examples/planner
 //! ```
 //!
-//! PROTOCOL.md describes the messages. It needs serde_json, and nothing of avastra.
+//! docs/reference/protocol.md describes the messages. It needs serde_json, and nothing of avastra.
 
 use std::io::{BufRead, Write, stdin, stdout};
 

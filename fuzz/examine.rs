@@ -74,7 +74,7 @@ fn examine_meaning(text: &str) {
         Some("avastra45.ava") => Ok(AVASTRA.to_owned()),
         Some("roads.ava") => Ok(ROADS.to_owned()),
         _ if path.extension().is_some_and(|ending| ending == "xodr") => Ok(STRAIGHT.to_owned()),
-        _ => Err(ReadError("no such file".to_owned())),
+        _ => Err(ReadError::missing("no such file")),
     };
     let mut loaded = load(Path::new(OWN), &read).expect("its text is known");
     let mut scenes = Scenes::default();

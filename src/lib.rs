@@ -13,7 +13,7 @@
 //! use avastra::check::{ReadError, load};
 //! use avastra::run::{Conditions, Run, RunSettings};
 //!
-//! let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
+//! let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string()));
 //! let loaded = load(Path::new("scenarios/avastra45.ava"), &read)?;
 //! let space = loaded.space.expect("it has no mistakes");
 //!

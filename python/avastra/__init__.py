@@ -20,7 +20,7 @@ nothing but Python:
 
     avastra.serve(Cruise)
 
-Then `avastra run SPACE --ads 'python3 cruise.py'`. PROTOCOL.md describes what is sent.
+Then `avastra run SPACE --ads 'python3 cruise.py'`. docs/reference/protocol.md describes what is sent.
 """
 
 from typing import TYPE_CHECKING, Any, List

@@ -47,6 +47,7 @@ class Variable:
     #: The words that its values stand for; empty for a quantity.
     words: List[Tuple[str, float]]
 
+def main(words: List[str]) -> int: ...
 def variables() -> List[Variable]:
     """The variables of a raw observation, in its order: the paper's 19, then 25 of our own."""
 

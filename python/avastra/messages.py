@@ -1,4 +1,4 @@
-"""The messages of the protocol avastra-ads/1 as Python objects; PROTOCOL.md is the specification.
+"""The messages of the protocol avastra-ads/1 as Python objects; docs/reference/protocol.md is the specification.
 
 What the simulator says is read into the classes of the first part; fields that it adds in later versions are ignored.
 What a driver answers is a `Control`, an `Acceleration` or a `Trajectory`.

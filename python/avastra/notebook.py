@@ -35,7 +35,7 @@ class _Page:
         named = os.environ.get("AVASTRA", "avastra")
         program = shutil.which(named)
         if program is None:
-            raise FileNotFoundError(f"there is no program `{named}`, which draws the page: `cargo install --path .` in avastra's "
+            raise FileNotFoundError(f"there is no program `{named}`, which draws the page: `cargo install --locked --path .` in avastra's "
                                     "repository installs it, or name it with the environment variable AVASTRA")
         with tempfile.TemporaryDirectory() as folder:
             page = Path(folder) / "report.html"

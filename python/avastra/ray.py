@@ -8,7 +8,7 @@ the shards together: the directory has the bytes of the unsharded one, but for `
 same command goes on, too.
 
 The program, the files that the command names, and the folders must be at the same paths on all nodes, as on a cluster with a
-shared file system. Needs Ray 2.60 or later (`pip install './python[ray]'`), and the program (`cargo install --path .`).
+shared file system. Needs Ray 2.60 or later (`pip install './python[ray]'`), and the program (`cargo install --locked --path .`).
 
 A training is no such command: it is one sequence, in which each episode is chosen by weights that the one before has changed.
 Many trainings at once are a study.
@@ -116,7 +116,7 @@ def _parsed(arguments: Optional[Sequence[str]]) -> Tuple[argparse.Namespace, Lis
                         help="the program [default: AVASTRA, or `avastra` in the PATH]")
     # What `--resume` takes, too: see `_anew`.
     parser.add_argument("--reuse", metavar="DIR", help=argparse.SUPPRESS)
-    parser.add_argument("--fail-on-collision", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--fail-on", help=argparse.SUPPRESS)
     # What is for the output of the whole.
     parser.add_argument("--format", help=argparse.SUPPRESS)
     parser.add_argument("--color", help=argparse.SUPPRESS)
@@ -153,7 +153,7 @@ def _number(text: str) -> int:
 def _program(program: str) -> str:
     found = shutil.which(program)
     if found is None:
-        raise Refused(f"there is no program `{program}`: `cargo install --path .` in avastra's repository installs it, or name it "
+        raise Refused(f"there is no program `{program}`: `cargo install --locked --path .` in avastra's repository installs it, or name it "
                       "with `--program` or AVASTRA")
     return os.path.abspath(found)
 
@@ -182,7 +182,7 @@ def _shards_max(options: argparse.Namespace, passed: List[str]) -> int:
 
 def _anew(options: argparse.Namespace) -> List[str]:
     """What is said again of a shard that is gone on with."""
-    return [*(["--reuse", options.reuse] if options.reuse else []), *(["--fail-on-collision"] if options.fail_on_collision else [])]
+    return [*(["--reuse", options.reuse] if options.reuse else []), *(["--fail-on", options.fail_on] if options.fail_on else [])]
 
 
 def _cluster(options: argparse.Namespace, passed: List[str], shards: Optional[int], most: int) -> int:

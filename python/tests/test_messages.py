@@ -1,4 +1,4 @@
-"""What is read and written: the examples of PROTOCOL.md, and what is refused."""
+"""What is read and written: the examples of docs/reference/protocol.md, and what is refused."""
 
 import json
 import math
@@ -9,12 +9,12 @@ import avastra
 from avastra import messages
 from avastra.messages import ProtocolError, answer, read
 
-PROTOCOL_PAGE = pathlib.Path(__file__).parents[2] / "PROTOCOL.md"
+PROTOCOL_PAGE = pathlib.Path(__file__).parents[2] / "docs/reference/protocol.md"
 READ_AS = {"init": messages.Init, "map": messages.Map, "reset": messages.Reset, "step": messages.Step, "event": messages.Event}
 
 
 def examples():
-    """The messages of PROTOCOL.md."""
+    """The messages of docs/reference/protocol.md."""
     lines = PROTOCOL_PAGE.read_text(encoding="utf-8").splitlines()
     return [json.loads(line) for line in lines if line.startswith('{"type"')]
 

@@ -168,11 +168,11 @@ class OnRay(unittest.TestCase):
 
     def test_a_killed_program_is_gone_on_with(self):
         (self.folder / "kill_2").write_text("2")
-        status, told = self.called("run", "s.ava", "--shards", "3", "--fail-on-collision")
+        status, told = self.called("run", "s.ava", "--shards", "3", "--fail-on", "collision")
         self.assertEqual(status, 0, told)
         own = [asked for asked in self.asked() if self.shard(2) in asked and asked[0] == "run"]
-        self.assertEqual(own[0][-3:], ["--jobs", "1", "--fail-on-collision"])
-        self.assertEqual(own[1:], [["run", "--resume", self.shard(2), "--jobs", "1", "--fail-on-collision"]] * 2)
+        self.assertEqual(own[0][-4:], ["--jobs", "1", "--fail-on", "collision"])
+        self.assertEqual(own[1:], [["run", "--resume", self.shard(2), "--jobs", "1", "--fail-on", "collision"]] * 2)
 
     def test_a_shard_that_is_always_killed_ends_the_command(self):
         (self.folder / "kill_1").write_text("99")

@@ -13,7 +13,7 @@
 //! use avastra_lang::check::{ReadError, load};
 //! use avastra_world::action::ActionTable;
 //!
-//! let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
+//! let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string()));
 //! let space = load(Path::new("../../scenarios/avastra45.ava"), &read)?.space.expect("it has no mistakes");
 //! let ads = Selected::new(by_name("modular").expect("it is in the registry"));
 //! let arena = Arena::new(ActionTable::new(space), &["corner".to_owned()], ads, &[], &[])?;
@@ -42,3 +42,9 @@ pub mod train;
 pub mod trial;
 pub mod study;
 pub mod emit;
+
+/// The databases of directories, each with the version of its layout.
+pub fn layouts() -> [(&'static str, i64); 3] {
+    let [run, study, estimate] = [run::LAYOUT.version, study::LAYOUT.version, estimate::LAYOUT.version];
+    [("run.db", run), ("study.db", study), ("estimate.db", estimate)]
+}

@@ -46,10 +46,10 @@ pub fn ambient_text(run: &Run) -> Option<String> {
     })
 }
 
-/// The changes that the driving system's profile makes, for a heading; empty if the profile is the default. The settings
-/// have the profile, so a resumed command says the changes, too.
+/// What the driving system's profile changes, in a few words; empty if the profile is the default. The settings have the whole
+/// profile, so a resumed command says so, too.
 pub fn profile_text(profile: Option<&Profile>) -> String {
-    let line = profile.map(|profile| profile.settings.to_line());
+    let line = profile.map(|profile| profile.settings.in_words());
     line.filter(|line| !line.is_empty()).map_or_else(String::new, |line| format!(" with {line}"))
 }
 

@@ -1,5 +1,5 @@
-//! `avastra editor-files`: the parts of the VS Code extension (`editors/vscode`) that follow from the language. They are
-//! a TextMate grammar with its words, and the rules for its brackets and comments.
+//! `avastra editor-files`: what colours a text and follows from the language. For VS Code it is a TextMate grammar, and the
+//! rules for brackets and comments; for Vim a syntax file; for the book a language of highlight.js.
 //!
 //! A test compares what is shipped with what would be written.
 
@@ -30,31 +30,101 @@ pub fn editor_files(output: &Output, arguments: &EditorFilesArguments) -> Result
     Ok(())
 }
 
-/// The files: name in the folder of the extension, and text.
-fn texts() -> [(&'static str, String); 2] {
+/// The files: name in the repository, and text.
+fn texts() -> [(&'static str, String); 4] {
     let text = |value: &Value| {
         let text = serde_json::to_string_pretty(value).expect("it is JSON already");
         format!("{text}\n")
     };
     [
-        ("syntaxes/avastra.tmLanguage.json", text(&grammar())),
-        ("language-configuration.json", text(&behaviour())),
+        ("editors/vscode/syntaxes/avastra.tmLanguage.json", text(&grammar())),
+        ("editors/vscode/language-configuration.json", text(&behaviour())),
+        ("editors/vim/syntax/avastra.vim", vim()),
+        ("docs/ava.js", highlight()),
     ]
 }
 
-/// The grammar by which editors colour a text without a server.
-fn grammar() -> Value {
+/// The words of the engine that a file may use, sorted.
+fn engine_words() -> Vec<&'static str> {
     let engine = ["does", "lane", "side", "then", "colour", "ignores", "body"].map(words::engine_words);
     let mut engine: Vec<&str> = engine.iter().flatten().map(|(word, _)| *word).collect();
     engine.sort_unstable();
     engine.dedup();
-    let facts = [
-        words::facts(Site::Requirement),
-        words::facts(Site::Rule),
-        words::facts(Site::Verdict),
-        words::of::<StopReason>(),
-    ]
-    .concat();
+    engine
+}
+
+/// The facts, and what an episode stops for.
+fn facts() -> Vec<&'static str> {
+    let sites = [Site::Requirement, Site::Rule, Site::Verdict].map(words::facts);
+    let mut facts = names(&[sites.concat(), words::of::<StopReason>()].concat());
+    facts.sort_unstable();
+    facts.dedup();
+    facts
+}
+
+/// The syntax file of Vim and Neovim.
+fn vim() -> String {
+    let mut text = "\" The syntax of avastra's files, written by `avastra editor-files`.\n\
+         if exists(\"b:current_syntax\")\n  finish\nendif\n\
+         syntax iskeyword @,48-57,_,.\n"
+        .to_owned();
+    for (group, words) in [
+        ("avaDeclaration", names(keyword::DECLARATIONS)),
+        ("avaClause", names(keyword::CLAUSES)),
+        ("avaOperator", names(keyword::OPERATORS)),
+        ("avaLiteral", names(keyword::LITERALS)),
+        ("avaType", names(&words::types())),
+        ("avaWord", engine_words()),
+        ("avaFact", facts()),
+    ] {
+        text += &format!("syntax keyword {group} {}\n", words.join(" "));
+    }
+    text += concat!(
+        "syntax match avaNumber /\\<\\d\\+\\(\\.\\d\\+\\)\\?\\([eE][+-]\\?\\d\\+\\)\\?/\n",
+        "syntax region avaString start=/\"/ skip=/\\\\./ end=/\"/ oneline\n",
+        "syntax match avaComment /\\/\\/.*$/\n",
+        "syntax match avaDoc /\\/\\/[\\/!].*$/\n",
+    );
+    for (group, of) in [
+        ("avaDeclaration", "Keyword"),
+        ("avaClause", "Statement"),
+        ("avaOperator", "Operator"),
+        ("avaLiteral", "Boolean"),
+        ("avaType", "Type"),
+        ("avaWord", "Constant"),
+        ("avaFact", "Identifier"),
+        ("avaNumber", "Number"),
+        ("avaString", "String"),
+        ("avaComment", "Comment"),
+        ("avaDoc", "SpecialComment"),
+    ] {
+        text += &format!("highlight default link {group} {of}\n");
+    }
+    text + "let b:current_syntax = \"avastra\"\n"
+}
+
+/// The language of highlight.js, which mdBook uses. A page is coloured before this is loaded, so its blocks are coloured again.
+fn highlight() -> String {
+    let keyword = [names(keyword::DECLARATIONS), names(keyword::CLAUSES), names(keyword::OPERATORS)].concat();
+    let built_in = [engine_words(), facts()].concat();
+    let keywords = json!({
+        "$pattern": r"[A-Za-z_][A-Za-z0-9_.]*",
+        "keyword": keyword,
+        "literal": names(keyword::LITERALS),
+        "type": names(&words::types()),
+        "built_in": built_in,
+    });
+    format!(
+        "// The colours of avastra's files, written by `avastra editor-files`.\n\
+         hljs.registerLanguage(\"ava\", (hljs) => ({{\n  keywords: {keywords},\n  \
+         contains: [hljs.C_LINE_COMMENT_MODE, hljs.QUOTE_STRING_MODE, hljs.C_NUMBER_MODE],\n}}));\n\
+         document.querySelectorAll(\"code.language-ava\").forEach((block) => {{\n  \
+         block.textContent = block.textContent;\n  hljs.highlightBlock(block);\n}});\n"
+    )
+}
+
+/// The grammar by which editors colour a text without a server.
+fn grammar() -> Value {
     // No name follows these keywords.
     let nameless = ["language", "use", "optional", "episode", "reward", "expect", "override"];
     let mut naming = names(keyword::DECLARATIONS);
@@ -88,8 +158,8 @@ fn grammar() -> Value {
             rule("constant.language", one_of(names(keyword::LITERALS))),
             rule("keyword.control", one_of(names(keyword::CLAUSES))),
             rule("support.type", one_of(names(&words::types()))),
-            rule("support.constant", one_of(engine)),
-            rule("support.variable", one_of(names(&facts))),
+            rule("support.constant", one_of(engine_words())),
+            rule("support.variable", one_of(facts())),
             {
                 "match": format!(r"\b([0-9]+(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?)(?:[ \t]*({}))?", units_pattern()),
                 "captures": {

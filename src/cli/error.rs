@@ -27,6 +27,8 @@ pub enum Failure {
     },
     #[error("requirements were breached in {count}", count = super::output::plural(*episodes, "episode"))]
     Breach { episodes: usize },
+    #[error("{count} recur under other noise", count = super::output::plural(*findings, "finding"))]
+    Recurring { findings: usize },
     /// The external driving system is not the one that the campaign was begun with.
     #[error("{message}")]
     OtherProgram { message: String },
@@ -74,7 +76,10 @@ impl Failure {
             | Failure::OtherProgram { .. }
             | Failure::NotPlayed { in_source: true, .. } => 2,
             Failure::Refuted { .. } => 3,
-            Failure::Collision { .. } | Failure::Breach { .. } | Failure::Failing { .. } => 4,
+            Failure::Collision { .. }
+            | Failure::Breach { .. }
+            | Failure::Recurring { .. }
+            | Failure::Failing { .. } => 4,
             Failure::Ads { .. } | Failure::Unreached { .. } => 5,
             // A shell reports this status for a process that SIGINT ended.
             Failure::Stopped | Failure::Interrupted { .. } => 130,

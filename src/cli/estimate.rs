@@ -7,11 +7,11 @@ use std::sync::atomic::AtomicBool;
 use avastra_base::outside::Shown;
 use avastra_base::statistics::Interval;
 use avastra_campaign::estimate::{
-    Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
-    FRAME, Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, compared,
-    pilot, play_parts,
+    Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateError, EstimateResults,
+    EstimateSettings, EventKind, FRAME, Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played,
+    Probability, Stopping, compared, pilot, play_parts,
 };
-use avastra_campaign::run::{DatabaseError, Run, RunSettings, Shard, Units};
+use avastra_campaign::run::{DatabaseError, Run, RunError, RunSettings, Shard, Units};
 use avastra_world::action::ActionTable;
 
 use super::arguments::EstimateArguments;
@@ -24,7 +24,7 @@ use super::interrupt::stop_on_interrupt;
 use super::output::{Output, for_shell, plural};
 use super::parallel::jobs;
 use super::progress::{Progress, Working};
-use super::run::{critical_text, cut_short};
+use super::run::{critical_text, cut_short, next_text};
 use super::run_directory::{Player, Resumed, written};
 use super::{conditions, load, merge, run_directory, shard};
 
@@ -164,6 +164,9 @@ fn play_all(
     thinking_text(estimate.run().arena().program()).iter().for_each(|text| output.say(text));
     let critical = directory.critical(output)?;
     output.say(&critical_text(&path, &critical, &[]));
+    if !critical.is_empty() {
+        output.say(&next_text(&path, &critical, &[]));
+    }
     let is_reproducible = is_reproducible(output, estimate.run().arena().program());
     output.result(serde_json::json!({
         "directory": path, "results": results, "critical": critical, "reproducible": is_reproducible,
@@ -377,13 +380,20 @@ fn wanted(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, S
         run: conditions::settings(table.space(), conditions, &conditions.agent, under_test, episodes)?,
     };
     let settings = settings.started_unless(arguments.shard.dry_run);
-    Ok((Estimate::new(table, settings).map_err(Failure::usage)?, shard))
+    Ok((Estimate::new(table, settings).map_err(failed)?, shard))
+}
+
+fn failed(error: EstimateError) -> Failure {
+    match error {
+        EstimateError::Run(error) => error.into(),
+        _ => Failure::usage(error),
+    }
 }
 
 /// The rest of an interrupted estimate. With `is_played`, nothing of it is left to play, and no program is started.
 fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Estimate, Directory), Failure> {
     let Resumed { settings, text, table, held } = run_directory::resume(output, path, is_played)?;
-    let estimate = Estimate::new(table, settings).map_err(Failure::usage)?;
+    let estimate = Estimate::new(table, settings).map_err(failed)?;
     Ok((estimate, Directory::open_to_go_on(output, held, &text)?))
 }
 
@@ -403,6 +413,9 @@ fn compare(
         Ok::<_, Failure>(Run::new(table.clone(), settings)?)
     };
     let (first, second) = (side(sides[0])?, side(sides[1])?);
+    if first.settings().rows > 0 {
+        return Err(RunError::OneRow { name: arguments.conditions.agent.clone() }.into());
+    }
     let event = EventKind::from(arguments.event.clone());
     event.check(table.space(), first.arena().rules()).map_err(Failure::usage)?;
     let comparison = Comparison { first, second, event };

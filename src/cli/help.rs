@@ -8,11 +8,13 @@ use clap::error::Error;
 use clap::{Arg, Command, CommandFactory};
 
 use avastra_drivers as ads;
+use avastra_drivers::external::PROTOCOL;
+use avastra_lang::syntax::LANGUAGE;
 use avastra_search::agent::{self, Kind};
-use avastra_world::sim::TrafficProfile;
+use avastra_world::sim::{ENGINE, TrafficProfile};
 
 use super::arguments::Arguments;
-use super::output::{COLUMNS, folded};
+use super::output::{COLUMNS, SCHEMA, folded};
 
 const STATUS: &str = "\
 Exit status:
@@ -21,12 +23,13 @@ Exit status:
   2    mistakes in a source file; for `fmt --check`, a file is not formatted;
        for `--resume`, another driving system than the one begun with
   3    a claim is refuted
-  4    a counted collision (`run --fail-on-collision`), or a failing `test`
+  4    what `run --fail-on` names was found, or a `test` fails
   5    a driving system of your own failed (`ads check`, `study`, `estimate`,
-       `replay`, `run --fail-on-collision`; `run` and `train` if it drove no
+       `replay`, `run --fail-on`; `run` and `train` if it drove no
        episode to its end, or could not be reached any more)
        Of several, the first in this order holds: 1 and 2 before 3, 4, 5.
-  130  Ctrl-C; what was done is saved, and `--resume` goes on
+  130  Ctrl-C (143: SIGTERM). `run`, `train`, `study` and `estimate DIR` save
+       what was done, and `--resume` goes on
 
 `avastra COMMAND --help` has examples. `avastra explain` lists every diagnostic,
 `avastra explain json` describes what `--format json` prints.";
@@ -110,7 +113,7 @@ report runs/0001 --ads scenarios/ads/default.yaml # two driving systems on one c
 report runs/0001 --ads cc # beside UN R157's careful driver
 render runs/0001/critical/corner_0004.ava --strip # the seconds up to the crash
 render runs/0001/critical/corner_0004.ava --at 12.5 -o moment.svg
-ads check --ads './my_planner --fast' # does it follow PROTOCOL.md?
+ads check --ads './my_planner --fast' # does it follow the protocol?
 ads check --ads tcp:127.0.0.1:5555 # one that listens on a socket
 ads schema # JSON Schema of every message
 ads check --ads 'avastra ads toy --misbehave nan' # what a finding looks like
@@ -165,7 +168,7 @@ fn grouped(command: &Command) -> String {
 
 /// The whole command line, with all that `--help` says.
 pub fn command() -> Command {
-    let mut command = Arguments::command().after_help(STATUS);
+    let mut command = Arguments::command().after_help(STATUS).long_version(versions());
     let groups = grouped(&command);
     command = command.help_template(format!(
         "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n\n{groups}Every command:\n{{options}}{{after-help}}"
@@ -180,6 +183,17 @@ pub fn command() -> Command {
         command = command.mut_subcommand(name, |command| command.after_help(text));
     }
     command
+}
+
+/// The versions of all that other programs may depend on.
+fn versions() -> String {
+    let layouts = avastra_campaign::layouts().map(|(name, version)| format!("{name} {version}"));
+    format!(
+        "{}\nlanguage {LANGUAGE}\nengine {ENGINE} (the same engine plays the same episodes)\nprotocol {PROTOCOL}\n\
+         JSON schema {SCHEMA}\ndatabases {}",
+        env!("CARGO_PKG_VERSION"),
+        layouts.join(", ")
+    )
 }
 
 const ONE_THREAD: &str = "\

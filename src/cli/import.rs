@@ -170,7 +170,7 @@ fn plays(texts: &[&(PathBuf, String)], maps: &BTreeMap<PathBuf, PathBuf>) -> Res
             return load::read_used(source);
         }
         let own = texts.iter().find(|(own, _)| check::normal(own) == path);
-        own.map(|(_, text)| text.clone()).ok_or_else(|| ReadError("it uses its maps alone".to_owned()))
+        own.map(|(_, text)| text.clone()).ok_or_else(|| ReadError::new("it uses its maps alone".to_owned()))
     };
     let Some((last, _)) = texts.last() else { return Ok(()) };
     let loaded = check::load(last, &read).map_err(|error| error.to_string())?;

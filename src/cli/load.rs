@@ -498,13 +498,13 @@ pub fn read_used(path: &Path) -> Result<String, ReadError> {
 pub fn read_named(path: &Path, extensions: &[&str], what_else: &str) -> Result<String, ReadError> {
     let followed = path.canonicalize().map_err(|error| {
         let meant = beside(path).map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));
-        ReadError(format!("{}{meant}", reason(&error)))
+        unread(&error, &meant)
     })?;
     let is_of_the_kind = |path: &Path| {
         path.extension().is_some_and(|extension| extensions.iter().any(|known| extension == *known))
     };
     if followed.is_file() && !is_of_the_kind(&followed) {
-        return Err(ReadError(format!("it is {what_else}")));
+        return Err(ReadError::new(format!("it is {what_else}")));
     }
     read(path)
 }
@@ -523,20 +523,29 @@ fn beside(missing: &Path) -> Option<String> {
     Some(format!("{near}.{extension}"))
 }
 
+/// The error of the system, and what the user may have meant.
+fn unread(error: &std::io::Error, meant: &str) -> ReadError {
+    let reason = format!("{}{meant}", reason(error));
+    match error.kind() {
+        std::io::ErrorKind::NotFound => ReadError::missing(reason),
+        _ => ReadError::new(reason),
+    }
+}
+
 /// Reads a text file of a limited size. A pipe would wait, a device has no end: only regular files are read.
 fn read_up_to(path: &Path, bytes_max: u64) -> Result<String, ReadError> {
-    let unread = |error| ReadError(reason(&error));
+    let unread = |error| unread(&error, "");
     let metadata = std::fs::metadata(path).map_err(unread)?;
     if metadata.is_dir() {
-        return Err(ReadError(FOLDER.to_owned()));
+        return Err(ReadError::new(FOLDER.to_owned()));
     }
     if !metadata.is_file() {
-        return Err(ReadError("it is no regular file".to_owned()));
+        return Err(ReadError::new("it is no regular file".to_owned()));
     }
     let bytes = bytes_of(File::open(path).map_err(unread)?, bytes_max)?;
     // Files of XML may say what encoding they are in.
     match path.extension().is_some_and(|extension| extension == "xodr" || extension == "xosc") {
-        true => avastra_road::xml_text(bytes).map_err(ReadError),
+        true => avastra_road::xml_text(bytes).map_err(ReadError::new),
         false => utf8(bytes),
     }
 }
@@ -550,16 +559,16 @@ pub fn stdin() -> Result<String, Failure> {
 /// Bytes of a limited number. A file may grow while it is read, and a device has no end.
 fn bytes_of(from: impl Read, bytes_max: u64) -> Result<Vec<u8>, ReadError> {
     let mut bytes = Vec::new();
-    from.take(bytes_max + 1).read_to_end(&mut bytes).map_err(|error| ReadError(reason(&error)))?;
+    from.take(bytes_max + 1).read_to_end(&mut bytes).map_err(|error| ReadError::new(reason(&error)))?;
     if bytes.len() as u64 > bytes_max {
-        return Err(ReadError(format!("it is larger than {} MiB", bytes_max >> 20)));
+        return Err(ReadError::new(format!("it is larger than {} MiB", bytes_max >> 20)));
     }
     Ok(bytes)
 }
 
 fn utf8(bytes: Vec<u8>) -> Result<String, ReadError> {
     String::from_utf8(bytes).map_err(|error| {
-        ReadError(format!("not text: byte {} is not UTF-8", error.utf8_error().valid_up_to()))
+        ReadError::new(format!("not text: byte {} is not UTF-8", error.utf8_error().valid_up_to()))
     })
 }
 

@@ -4,7 +4,7 @@ use clap::error::{ContextKind, ContextValue};
 
 use avastra_lang::syntax::nearest;
 
-use super::help;
+use super::{help, output};
 
 /// An unknown command's error with its present name, or else with the command that differs least. For `rn`, clap's own
 /// measure prefers `render` to `run`.
@@ -21,7 +21,7 @@ pub fn with_nearest_command(mut error: clap::Error) -> clap::Error {
         return error;
     };
     // Words of `ads` have other neighbours.
-    if std::env::args().skip(1).find(|argument| !argument.starts_with('-')).as_ref() != Some(&word) {
+    if output::command_line().iter().find(|argument| !argument.starts_with('-')) != Some(&word) {
         return error;
     }
     let command = help::command();

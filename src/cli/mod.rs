@@ -56,6 +56,7 @@ mod train;
 mod trials;
 mod why;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{ArgMatches, FromArgMatches};
@@ -76,21 +77,28 @@ fn words_of(found: &ArgMatches) -> String {
 }
 
 /// Ends a process whose command line cannot be carried out.
-fn refused(failure: &Failure) -> ExitCode {
+fn refused(failure: &Failure) -> u8 {
     match output::asks_for_json() {
         true => output::usage_in_json(failure),
         false => output::remark(&format!("error: {failure}")),
     }
-    ExitCode::from(failure.status())
+    failure.status()
 }
 
 /// Runs the command that the process was started with.
 pub fn main() -> ExitCode {
+    ExitCode::from(main_of(std::env::args_os().collect()))
+}
+
+/// Runs the command of a command line, whose first word is the program's name, and returns its exit status. A process may
+/// do so once.
+pub fn main_of(words: Vec<OsString>) -> u8 {
+    let words = output::begin(words);
     // File names end up in files and in JSON, which are text. So this is said before anything is played.
-    if let Some(argument) = std::env::args_os().find(|argument| argument.to_str().is_none()) {
+    if let Some(argument) = words.iter().find(|argument| argument.to_str().is_none()) {
         return refused(&Failure::usage(format!("{argument:?} is not UTF-8: rename the file")));
     }
-    let found = match help::command().try_get_matches() {
+    let found = match help::command().try_get_matches_from(words) {
         Ok(found) => found,
         Err(error) => {
             let error = mistyped::with_nearest_command(error);
@@ -101,9 +109,9 @@ pub fn main() -> ExitCode {
             }
             let is_lost = error.print().or_else(output::unless_closed).is_err();
             if !error.use_stderr() {
-                return if is_lost { ExitCode::FAILURE } else { ExitCode::SUCCESS };
+                return u8::from(is_lost);
             }
-            return ExitCode::from(Failure::usage(error.kind().to_string()).status());
+            return Failure::usage(error.kind().to_string()).status();
         }
     };
     let arguments = Arguments::from_arg_matches(&found).expect("clap has parsed them");
@@ -154,5 +162,5 @@ pub fn main() -> ExitCode {
         output::remark(&format!("error: {lost}"));
     }
     // A result that could not be printed counts as a failure.
-    arrived.and(result).map_or_else(|failure| ExitCode::from(failure.status()), |()| ExitCode::SUCCESS)
+    arrived.and(result).map_or_else(|failure| failure.status(), |()| 0)
 }

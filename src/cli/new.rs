@@ -6,7 +6,7 @@ use clap::builder::PossibleValuesParser;
 
 use avastra_base::outside::{Shown, in_comment};
 use avastra_campaign::emit;
-use avastra_road::{RoadMap, propose};
+use avastra_road::{RoadMap, Route, propose};
 
 use super::arguments::NewArguments;
 use super::error::Failure;
@@ -141,6 +141,12 @@ fn example(name: &str) -> Vec<(String, String)> {
     files
 }
 
+/// Steps in which a driving system arrives that waits at lights and for others: a mean of 5 m/s in steps of 6 s, and at
+/// least what the space to begin with has.
+fn steps_for(length_m: f64) -> u32 {
+    ((length_m / 30.0).ceil() as u32).max(20)
+}
+
 /// The space to begin with, on proposed routes of a map, with the map.
 fn on_map(output: &Output, path: &Path) -> Result<Vec<(String, String)>, Failure> {
     let text = load::text(path)?;
@@ -168,6 +174,9 @@ fn on_map(output: &Output, path: &Path) -> Result<Vec<(String, String)>, Failure
         output.tell(&format!("{name}: {reason}"));
         names.push(name);
     }
+    let routes = proposals.iter().filter_map(|way| Route::find(&map, way.start, way.goal).ok());
+    let longest_m = routes.map(|route| route.path.length_m()).fold(0.0, f64::max);
     let space = STARTER[0].1.replace("roads: [corner]", &format!("roads: [{}]", names.join(", ")));
+    let space = space.replace("limit: 20 steps", &format!("limit: {} steps", steps_for(longest_m)));
     Ok(vec![("space.ava".to_owned(), space), ("roads.ava".to_owned(), roads), (file, text)])
 }

@@ -1,9 +1,10 @@
 //! Printing: results on stdout, everything else on stderr, in the form that was asked for.
 
 use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
-use std::sync::Mutex;
+use std::sync::{Mutex, OnceLock};
 
 use avastra_base::outside::{Shown, json_on_terminal, on_terminal};
 use avastra_lang::syntax::{Diagnostic, DiagnosticRecord, Sources, Style};
@@ -31,7 +32,7 @@ pub struct Output {
 type Fields = serde_json::Map<String, serde_json::Value>;
 
 /// Raised whenever a field of a command's result changes its meaning or goes away.
-const SCHEMA: u32 = 4;
+pub const SCHEMA: u32 = 4;
 
 /// The end of a command in JSON: its last line on stdout, whether it failed or not. `avastra explain json` says which
 /// fields a result has (`schema`).
@@ -239,9 +240,18 @@ impl Output {
     }
 }
 
-/// The words of the command line.
-fn command_line() -> Vec<String> {
-    std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()).collect()
+/// The command line that is being carried out.
+static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
+
+/// Keeps the words of the command line; those of the first call hold.
+pub fn begin(words: Vec<OsString>) -> &'static [OsString] {
+    WORDS.get_or_init(|| words)
+}
+
+/// The words of the command line behind the program's name.
+pub fn command_line() -> Vec<String> {
+    let words = WORDS.get().into_iter().flatten().skip(1);
+    words.map(|word| word.to_string_lossy().into_owned()).collect()
 }
 
 /// Whether a command line asks for JSON, also one that cannot be parsed.

@@ -20,9 +20,9 @@ use super::output::Output;
 
 /// A contact is marked this long after it happened, s.
 const CONTACT_SHOWN_S: f64 = 1.0;
-/// The moments of a strip, s before the first collision.
+/// The moments of a strip, s before the first collision or else the first breach.
 const STRIP_S: [f64; 5] = [4.0, 2.5, 1.5, 0.5, 0.0];
-/// Without a collision: this far apart, the first at the last action, s.
+/// Without either: this far apart, the first at the last action, s.
 const ACTION_STRIDE_S: f64 = 2.0;
 
 /// Draws the file's scenario.
@@ -89,10 +89,14 @@ fn times(arguments: &RenderArguments, scenario: &Scenario, step_s: f64) -> Resul
         times_s.sort_by(f64::total_cmp);
         return Ok(times_s);
     }
-    let first_s = scenario.claims.iter().find_map(|claim| match claim {
-        Claim::Collision { time, .. } => time.map(|time| time.si()),
-        _ => None,
-    });
+    let claimed_s = |is_of_a_collision: bool| {
+        scenario.claims.iter().find_map(|claim| match claim {
+            Claim::Collision { time, .. } if is_of_a_collision => time.map(|time| time.si()),
+            Claim::Breach { time, .. } if !is_of_a_collision => time.map(|time| time.si()),
+            _ => None,
+        })
+    };
+    let first_s = claimed_s(true).or_else(|| claimed_s(false));
     let Some(first_s) = first_s else {
         let acted = scenario.steps.iter().rfind(|step| step.row.is_some());
         let acted = acted.ok_or_else(|| {
@@ -102,7 +106,8 @@ fn times(arguments: &RenderArguments, scenario: &Scenario, step_s: f64) -> Resul
         let begin_s = acted.number as f64 * step_s + DT_S;
         return Ok((0..STRIP_S.len()).map(|n| begin_s + ACTION_STRIDE_S * n as f64).collect());
     };
-    Ok(STRIP_S.iter().map(|before_s| (first_s - before_s).max(0.0)).collect())
+    // The last panel is of the tick after a contact, which shows it.
+    Ok(STRIP_S.iter().map(|before_s| (first_s - before_s + DT_S / 2.0).max(0.0)).collect())
 }
 
 /// The world at the first tick at or after each time, as far as the episode lasts. Also the subject of the picture, and

@@ -7,8 +7,8 @@ use serde_json::Value;
 
 use avastra_base::outside::Shown;
 use avastra_campaign::run::{
-    Asked, Database, DatabaseError, FoundIn, HeatMap, ProtocolTest, RunSettings, Units, heat_maps, main_maps,
-    parameters, recorded,
+    Asked, Database, DatabaseError, FoundIn, HeatMap, ProtocolTest, RunSettings, Tally, Units, heat_maps,
+    main_maps, parameters, recorded,
 };
 use avastra_campaign::study::StudyResults;
 use avastra_campaign::train::TrainSettings;
@@ -277,11 +277,16 @@ fn of_run(
     let is_protocol = serde_yaml::from_str::<RunSettings>(settings).is_ok_and(|run| run.rows > 0);
     let space = table.as_ref().filter(|_| is_protocol).map(|table| &**table.space());
     let tests = database.tests(space).map_err(unread)?;
-    let heat = maps(asked, &tests, is_protocol)?;
+    let heat = maps(asked, &tests, is_protocol)?.into_iter();
+    let heat: Vec<HeatMap> = match &table {
+        Some(table) => heat.map(|map| map.told_by(table.space())).collect(),
+        None => heat.collect(),
+    };
     let (table, results) = (table.as_ref(), results.as_ref());
     found.overview = report::of_run(&database, table, settings, results, &heat).map_err(unread)?;
     if is_protocol {
-        found.overview["protocol"] = Value::from(protocol::counts_text(&tests));
+        found.overview["protocol"] =
+            serde_json::json!({ "text": protocol::counts_text(&tests), "tally": Tally::of(&tests) });
     }
     let groups = database.groups().map_err(unread)?;
     let name = |road: &str, episode: i64| format!("{road}_{episode:04}");

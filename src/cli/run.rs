@@ -20,7 +20,7 @@ use avastra_lang::model::Policy;
 use avastra_search::agent::{Face, Kind, by_name};
 use avastra_world::action::{ActionTable, Draw};
 
-use super::arguments::RunArguments;
+use super::arguments::{FailOn, RunArguments};
 use super::campaign::{self, Campaign, Cut, Item, Outside, Share, settled};
 use super::clock::now;
 use super::conditions::profile_text;
@@ -40,6 +40,9 @@ const EPISODES: u32 = 100;
 
 /// Episodes that are played twice with a program that says it is deterministic. One alone may come out the same by chance.
 const SPOT_CHECKS: usize = 3;
+
+/// Episodes that a run keeps if it found nothing, so that there is something to look at.
+const KEPT_OF_NOTHING: u32 = 3;
 
 /// Largest number of critical scenarios, groups and refusal reasons that the summary lists.
 const NAMED_MAX: usize = 10;
@@ -85,27 +88,45 @@ impl Cut for RunSettings {
 
 /// Plays the episodes of a new run, or those that an interrupted one still lacks.
 pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
+    let lacks_replays = |replays: u32| match replays == 0 && arguments.fail_on.contains(&FailOn::Recurring) {
+        true => Err(Failure::usage(
+            "`--fail-on recurring` needs replays, and the run has `--replays 0`: begin one with `--replays 20`",
+        )),
+        false => Ok(()),
+    };
     let begun = match &arguments.resume {
         Some(path) => Some(resumed(output, path, false)?),
-        None => begun(output, arguments)?,
+        None => {
+            lacks_replays(arguments.replays)?;
+            begun(output, arguments)?
+        }
     };
     let Some(((run, directory), elsewhere)) = begun else { return Ok(()) };
+    lacks_replays(run.settings().replays)?;
     output.tell(&format!("{}, into {}", heading(&run), directory.path.shown()));
     conditions::ambient_text(&run).iter().for_each(|text| output.tell(text));
     elsewhere.iter().for_each(|text| output.warn(text));
     let found = play_all(output, (run, directory), elsewhere, arguments.jobs)?;
-    if arguments.fail_on_collision && found.counted > 0 {
+    failed_on(&found, &arguments.fail_on)
+}
+
+/// The failure of a run of which the user asked to fail on something that was found.
+fn failed_on(found: &Totals, fail_on: &[FailOn]) -> Result<(), Failure> {
+    if fail_on.contains(&FailOn::Collision) && found.counted > 0 {
         let recurring = match found.replayed {
             0 => String::new(),
             _ => format!(", {} of them recur under other noise", found.counted_recurring),
         };
         return Err(Failure::Collision { collisions: found.counted as usize, recurring });
     }
-    if arguments.fail_on_breach && found.episodes_with_breach > 0 {
+    if fail_on.contains(&FailOn::Breach) && found.episodes_with_breach > 0 {
         return Err(Failure::Breach { episodes: found.episodes_with_breach as usize });
     }
-    // If no episode was driven to its end, nothing was tested, so the command fails without `--fail-on-collision`, too.
-    if found.failed > 0 && (arguments.fail_on_collision || found.failed == found.episodes) {
+    if fail_on.contains(&FailOn::Recurring) && found.recurring > 0 {
+        return Err(Failure::Recurring { findings: found.recurring as usize });
+    }
+    // If no episode was driven to its end, nothing was tested, so the command fails without `--fail-on`, too.
+    if found.failed > 0 && (!fail_on.is_empty() || found.failed == found.episodes) {
         return Err(Failure::Ads { findings: found.failed as usize });
     }
     Ok(())
@@ -197,21 +218,19 @@ fn play_all(
     }
     let critical = worst_first(directory.critical(output)?, &found);
     output.say(&critical_text(&directory.path, &critical, &found));
-    let kept = if is_over { keep_near(&run, &directory)? } else { Vec::new() };
+    let kept = match is_over {
+        true => keep_near(&run, &directory, critical.is_empty() && !is_protocol)?,
+        false => Vec::new(),
+    };
     if !kept.is_empty() {
         let kept = plural(kept.len(), "episode");
         output.say(&format!(
-            "{kept} without a finding in {}/kept: first those with a collision that does not count, then the nearest misses",
+            "{kept} without a finding in {}/kept:\n  first those with a collision that does not count, then the nearest misses",
             directory.path.shown()
         ));
     }
-    if kept.is_empty() && is_over && !is_protocol {
-        let nearest = directory.read(|database| database.near(1))?;
-        if nearest.iter().any(|near| near.collision.is_some()) {
-            output.say("next: `--keep 3` keeps episodes whose collisions do not count, to look at");
-        } else if critical.is_empty() {
-            output.say("next: `--keep 3` keeps the nearest misses; other roads may find more");
-        }
+    if is_over {
+        output.say(&next_text(&directory.path, &critical, &kept));
     }
     let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {
@@ -357,15 +376,18 @@ fn keep(
     directory.write(|database| database.add(summary, log, table.space(), in_words, scenario.as_deref()))
 }
 
-/// Writes the episodes without a finding that are to be kept. An attached driving system that cannot be started drives none of
+/// Writes the episodes without a finding that are to be kept; `is_empty`: the run found nothing. An attached driving system that cannot be started drives none of
 /// them again.
-fn keep_near(run: &Run, directory: &Directory) -> Result<Vec<PathBuf>, Failure> {
+fn keep_near(run: &Run, directory: &Directory, is_empty: bool) -> Result<Vec<PathBuf>, Failure> {
     let RunSettings { agent, conditions, keep, .. } = run.settings();
-    if *keep == 0 || !oracle::can_replay(run.arena().ads()) {
+    // Unasked, a program of the user's own is not driven again.
+    let keeps_some = is_empty && run.arena().program().is_none();
+    let keep = keep.unwrap_or(if keeps_some { KEPT_OF_NOTHING } else { 0 });
+    if keep == 0 || !oracle::can_replay(run.arena().ads()) {
         return Ok(Vec::new());
     }
     let player = Player { command: "run", table: run.table(), agent, conditions };
-    let near = directory.read(|database| database.near(*keep as usize))?;
+    let near = directory.read(|database| database.near(keep as usize))?;
     near.iter()
         .map(|near| {
             let episode = near.episode as usize;
@@ -480,9 +502,10 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize, is_mixed: bool) -
     }
     if totals.replayed > 0 {
         text.push_str(&format!(
-            "\n{} of {} recur under other noise (their 95 % interval lies above one half)",
+            "\n{} of {} {} under other noise (their 95 % interval lies above one half)",
             totals.recurring,
-            plural(totals.replayed as usize, "finding")
+            plural(totals.replayed as usize, "finding"),
+            if totals.replayed == 1 { "recurs" } else { "recur" }
         ));
         text.push_str(&mixed_text(is_mixed));
     }
@@ -511,7 +534,7 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize, is_mixed: bool) -
             totals.wronged, totals.wrong
         ));
         text.push_str(&format!(
-            "\nof all: {} avoidable by a careful driver, {} only without any delay, {} unavoidable",
+            "\nof all: {} avoidable by a careful driver, {} only by a quicker one or an evasive manoeuvre, {} unavoidable",
             totals.avoidable, totals.beyond_reference, totals.unavoidable
         ));
     }
@@ -630,8 +653,21 @@ pub fn critical_text(directory: &Path, files: &[PathBuf], found: &[FoundIn]) -> 
     // The star stands outside of the quotes: the shell must expand it.
     let directory = for_shell(directory);
     text.push_str(&format!("\nreplay them with: avastra replay {directory}/critical/*.ava"));
-    text.push_str(&format!("\nwatch them with: avastra report {directory}"));
     text
+}
+
+/// What to do next: look at the findings and make the first of them small, or look at the nearest misses, or find more.
+pub fn next_text(directory: &Path, critical: &[PathBuf], kept: &[PathBuf]) -> String {
+    let directory = for_shell(directory);
+    match (critical.first(), kept) {
+        (Some(first), _) => format!(
+            "next: avastra report {directory} makes a page to watch them;\n      avastra shrink {} looks for the\n      \
+             smallest scenario that fails so",
+            for_shell(first)
+        ),
+        (None, [_, ..]) => format!("next: avastra report {directory} makes a page to watch them"),
+        (None, []) => "next: more episodes (`--episodes`), ordinary traffic (`--ambient 6`) or other\n      roads may find more".to_owned(),
+    }
 }
 
 /// The head and a line for each of the first items; `rest` says how many more there are.

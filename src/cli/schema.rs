@@ -134,7 +134,7 @@ run
   failures[] object what went wrong with a driving system of your own: `kind`, `problem`, `times`, `detail`, `scenario`
   REPRODUCIBLE
 ads check
-  checks[] object `stage`, `passed`, what was `found`, the `failure` if it is one of PROTOCOL.md
+  checks[] object `stage`, `passed`, what was `found`, the `failure` if it is one of the protocol
   speed object? `questions`, `round_trips_per_s` and `share` of the episode's time
 ads schema
   protocol object the JSON Schema of every message
@@ -349,7 +349,7 @@ pub fn in_words() -> String {
 fn add(text: &mut String, fields: &[Field]) {
     for Field { path, kind, meaning } in fields {
         let meaning = folded(meaning, 80 - 36);
-        text.push_str(format!("\n  {path:<25}{kind:<9}{}", meaning[0]).trim_end());
+        text.push_str(format!("\n  {path:<24} {kind:<8} {}", meaning[0]).trim_end());
         meaning[1..].iter().for_each(|line| text.push_str(&format!("\n{:36}{line}", "")));
     }
 }

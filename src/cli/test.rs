@@ -126,14 +126,17 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         (count("still fails"), count("fixed"), count("ads failed"), count("error"));
     let passed = count(PASSED);
     let recorded = cases.iter().filter(|case| case.by.is_recorded).count();
-    let changed = count("changed") + count("gone");
+    let is_changed = |case: &&Case| matches!(case.in_words().0, "changed" | "gone");
+    let changed = cases.iter().filter(is_changed).count();
+    let changed_fails = cases.iter().filter(is_changed).filter(|case| case.outcome.is_failure()).count();
     if arguments.accept {
         output.say(&format!("{} written anew", plural(accepted, "scenario")));
     }
     output.say(&format!(
-        "{}: {fails} still fail, {fixed} fixed, {}{changed} changed, {errors} not played",
+        "{}: {fails} still fail, {fixed} fixed, {}{changed} changed{}, {errors} not played",
         plural(cases.len(), "scenario"),
         if passed > 0 { format!("{passed} {PASSED}, ") } else { String::new() },
+        if changed_fails > 0 { format!(" ({changed_fails} of them fail)") } else { String::new() },
     ));
     if recorded > 0 {
         output.warn(&format!(

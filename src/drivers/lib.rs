@@ -13,7 +13,7 @@
 //! use avastra_lang::model::RulesInForce;
 //! use avastra_world::sim::{Scene, Start, World};
 //!
-//! let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
+//! let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string()));
 //! let space = load(Path::new("../../scenarios/avastra45.ava"), &read)?.space.expect("it has no mistakes");
 //! let road = space.roads.iter().find(|road| road.name == "corner").expect("it is declared");
 //! let memory = space.memory_at_start(road, &RulesInForce::by_default(&space), 1)?;

@@ -19,7 +19,7 @@
 //!
 //! impl Files for Alone {
 //!     fn read(&self, _: &Path) -> Result<String, ReadError> {
-//!         Err(ReadError("no such file".to_owned()))
+//!         Err(ReadError::missing("no such file"))
 //!     }
 //!     fn below(&self, _: &Path) -> Vec<PathBuf> {
 //!         Vec::new()

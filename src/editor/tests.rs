@@ -16,7 +16,7 @@ struct Shelf(BTreeMap<PathBuf, String>);
 
 impl Files for Shelf {
     fn read(&self, path: &Path) -> Result<String, ReadError> {
-        self.0.get(path).cloned().ok_or_else(|| ReadError("no such file".to_owned()))
+        self.0.get(path).cloned().ok_or_else(|| ReadError::missing("no such file"))
     }
 
     fn below(&self, _: &Path) -> Vec<PathBuf> {

@@ -9,7 +9,7 @@
 //! use avastra_lang::check::{ReadError, load};
 //! use avastra_world::action::ActionTable;
 //!
-//! let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
+//! let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string()));
 //! let loaded = load(Path::new("../../tests/cases/exports/wet_corner.ava"), &read)?;
 //! let scenario = loaded.scenario.expect("it has no mistakes");
 //! let table = ActionTable::new(loaded.space.expect("so has its space"));

@@ -14,7 +14,7 @@
 //! use avastra_world::action::{ActionTable, Situation};
 //! use avastra_world::sim::{Control, Scene, Start, World};
 //!
-//! let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
+//! let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string()));
 //! let loaded = load(Path::new("../../scenarios/avastra45.ava"), &read)?;
 //! let table = ActionTable::new(loaded.space.expect("it has no mistakes"));
 //! let (space, road) = (table.space(), &table.space().roads[0]);

@@ -1,4 +1,4 @@
-"""Does docs/formats.md name every element and attribute of the schemas of OpenSCENARIO XML and OpenDRIVE?
+"""Does docs/reference/formats.md name every element and attribute of the schemas of OpenSCENARIO XML and OpenDRIVE?
 
 Arguments: folders with the schemas (`.xsd`) of both formats, such as the unpacked packages `asam-qc-openscenarioxml` and
 `asam-qc-opendrive` of PyPI (docs/maintaining.md). Each folder that holds schemas is one version. With `--list` it prints what the
@@ -128,7 +128,7 @@ def main():
             for name, attributes in sorted(elements.items()):
                 print(kind, name, *sorted(attributes))
         return
-    page = of_page((Path(__file__).parents[2] / "docs/formats.md").read_text())
+    page = of_page((Path(__file__).parents[2] / "docs/reference/formats.md").read_text())
     wrong = []
     for kind, elements in formats.items():
         rows, whole = page[kind]

@@ -74,7 +74,7 @@ fn the_rows_are_those_of_the_published_tables() {
     for (file, families) in [("euro_ncap_cars", CARS), ("euro_ncap_vulnerable", VULNERABLE)] {
         let path = root().join(format!("scenarios/catalogue/{file}.ava"));
         let read = |path: &std::path::Path| {
-            std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()))
+            std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string()))
         };
         let loaded = load(&path, &read).expect("it can be read");
         let table = ActionTable::new(loaded.space.expect("it has no mistakes"));

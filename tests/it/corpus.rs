@@ -16,7 +16,7 @@ use crate::command::{avastra, done, done_in, outcome};
 fn loaded(path: &Path, text: Option<&str>) -> Loaded {
     let read = |file: &Path| match text {
         Some(text) if file == path => Ok(text.to_owned()),
-        _ => std::fs::read_to_string(file).map_err(|error| ReadError(error.to_string())),
+        _ => std::fs::read_to_string(file).map_err(|error| ReadError::new(error.to_string())),
     };
     load(path, &read).expect("a case is readable")
 }
@@ -278,7 +278,7 @@ fn digests_differ_if_and_only_if_a_difference_is_told() {
         let mut loaded = |edited: &str| {
             let read = |file: &Path| match file == path {
                 true => Ok(edited.to_owned()),
-                false => std::fs::read_to_string(file).map_err(|error| ReadError(error.to_string())),
+                false => std::fs::read_to_string(file).map_err(|error| ReadError::new(error.to_string())),
             };
             load_with(&path, &read, &mut maps).expect("it is readable")
         };

@@ -785,26 +785,29 @@ fn no_prefix_of_a_file_breaks_anything() {
     }
 }
 
+/// All files below a folder.
+fn files_of(folder: &Path) -> Vec<std::path::PathBuf> {
+    let entries = std::fs::read_dir(folder).expect("it is there");
+    let paths = entries.map(|entry| entry.expect("it is readable").path());
+    paths.flat_map(|path| if path.is_dir() { files_of(&path) } else { vec![path] }).collect()
+}
+
 #[test]
 fn the_extension_is_that_of_the_language() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let folder = scratch.path().display().to_string();
     done(&["editor-files", &folder]);
-    let shipped = root().join("editors/vscode");
-    for name in ["syntaxes/avastra.tmLanguage.json", "language-configuration.json"] {
-        let read = |folder: &Path| std::fs::read_to_string(folder.join(name)).expect("it is readable");
-        assert_eq!(
-            read(&shipped),
-            read(scratch.path()),
-            "write it anew: `avastra editor-files editors/vscode`"
-        );
+    for path in files_of(scratch.path()) {
+        let name = path.strip_prefix(scratch.path()).expect("it lies there");
+        let read = |path: &Path| std::fs::read_to_string(path).expect("it is readable");
+        assert_eq!(read(&root().join(name)), read(&path), "write it anew: `avastra editor-files .`");
     }
+    let shipped = root().join("editors/vscode");
     let package = std::fs::read_to_string(shipped.join("package.json")).expect("it is readable");
     let package: Value = serde_json::from_str(&package).expect("it is JSON");
     assert_eq!(package["version"], env!("CARGO_PKG_VERSION"));
-    for path in [&package["main"], &package["contributes"]["grammars"][0]["path"]] {
-        assert!(shipped.join(text(path)).is_file(), "{path}");
-    }
+    let grammar = text(&package["contributes"]["grammars"][0]["path"]);
+    assert!(shipped.join(&grammar).is_file(), "{grammar}");
 }
 
 /// Folds, links, symbols of the workspace, signatures, and the fields of blocks.

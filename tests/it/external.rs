@@ -77,7 +77,7 @@ fn every_misbehaviour_is_a_finding_and_leaves_nothing_behind() {
         let folder = scratch.path().join(how);
         std::fs::create_dir(&folder).unwrap();
         let config = profile(&folder, &["--misbehave", how], &mark, more);
-        let settings = ["--episodes", "3", "--jobs", "1", "--fail-on-collision"];
+        let settings = ["--episodes", "3", "--jobs", "1", "--fail-on", "collision"];
         let (status, result, stderr) = run(&config, &folder.join("run"), &settings);
         let counted = result["totals"]["counted"].as_i64().expect("a number");
         assert_eq!(status, if counted > 0 { 4 } else { 5 }, "{how}: {stderr}\n{result}");

@@ -1,4 +1,4 @@
-//! docs/formats.md says of every attribute of OpenSCENARIO and OpenDRIVE what becomes of it: that is what the code does, as far as
+//! docs/reference/formats.md says of every attribute of OpenSCENARIO and OpenDRIVE what becomes of it: that is what the code does, as far as
 //! its text shows. `tests/interop/formats.py` compares the page with the schemas.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -60,7 +60,7 @@ fn of_code(path: &str) -> BTreeMap<String, Fates> {
 
 /// The table of a section of the page.
 fn of_page(heading: &str) -> BTreeMap<String, Fates> {
-    let page = read("docs/formats.md");
+    let page = read("docs/reference/formats.md");
     let section =
         page.split("\n## ").find(|section| section.starts_with(heading)).expect("it has the section");
     let names = |cell: &str| cell.split('`').skip(1).step_by(2).map(str::to_owned).collect::<BTreeSet<_>>();

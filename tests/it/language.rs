@@ -1,20 +1,17 @@
-//! The reference page: every example on it compiles, and every word of the language is on it.
+//! The reference of the language (docs/language): every word of the language is on it.
 
 use std::collections::BTreeSet;
 
-use avastra::check::Loaded;
 use avastra::model::vocabulary::{
     Body, Colour, EpisodeField, Fact, Field, LaneChoice, Level, Light, OriginField, Phenomenon, Priority,
     ROAD_LANES, ROAD_USER, RoadField, RoadKind, ScenarioClaim, Side, SpaceClaim, StartField, StopReason,
     TYPES, Then, TimeOfDay, TrafficRule, Verb, WAIT, Word, WordFact,
 };
 use avastra::model::{Avoidability, COUNTED, ENDS, MODULES, body};
-use avastra::syntax::Diagnostic;
 use avastra::syntax::keyword::keywords;
 use avastra::units::UNITS;
 
-use crate::cases::root;
-use crate::world::loaded;
+use crate::cases::{files_below, root};
 
 #[test]
 fn the_bodies_of_the_page_are_the_engines() {
@@ -29,48 +26,11 @@ fn the_bodies_of_the_page_are_the_engines() {
     }
 }
 
+/// The reference of the language, as one text.
 fn page() -> String {
-    std::fs::read_to_string(root().join("LANGUAGE.md")).expect("the page is there")
-}
-
-/// The texts between the fences of ```` ```ava ````, each with the words after `ava` and its line.
-fn examples(page: &str) -> Vec<(String, String, usize)> {
-    let mut found = Vec::new();
-    let mut lines = page.lines().enumerate();
-    while let Some((number, line)) = lines.next() {
-        let Some(info) = line.strip_prefix("```ava") else { continue };
-        let inside: Vec<&str> =
-            lines.by_ref().map(|(_, line)| line).take_while(|line| *line != "```").collect();
-        found.push((info.trim().to_owned(), inside.join("\n") + "\n", number + 1));
-    }
-    found
-}
-
-/// Compiles an example as if it stood beside the shipped files.
-fn compiled(example: &str) -> Loaded {
-    let text = match example.starts_with("language") || example.starts_with("//!") {
-        true => example.to_owned(),
-        false => format!("language 1\nuse \"avastra45.ava\"\n{example}"),
-    };
-    loaded("scenarios/example.ava", &text)
-}
-
-#[test]
-fn every_example_says_what_the_page_says_of_it() {
-    let examples = examples(&page());
-    assert!(examples.len() >= 18, "{} examples", examples.len());
-    let mut wrong = Vec::new();
-    for (info, text, line) in &examples {
-        let loaded = compiled(text);
-        let errors = loaded.diagnostics.iter().filter(|found| found.is_error());
-        let codes: Vec<&str> = errors.map(|found| found.code).collect();
-        let wanted: Vec<&str> = info.strip_prefix("error=").into_iter().collect();
-        if codes != wanted {
-            let messages: Vec<&Diagnostic> = loaded.diagnostics.iter().collect();
-            wrong.push(format!("line {line}: {messages:?}"));
-        }
-    }
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    let files = files_below(root().join("docs/language"), "md");
+    let texts = files.iter().map(|file| std::fs::read_to_string(file).expect("it is a text"));
+    texts.collect()
 }
 
 /// The words in the first column of the table with that heading.
@@ -126,5 +86,5 @@ fn every_word_of_the_language_is_on_the_page() {
         TimeOfDay::names().collect(),
     ];
     let missing: Vec<&str> = all.into_iter().flatten().filter(|word| !on_page.contains(word)).collect();
-    assert!(missing.is_empty(), "LANGUAGE.md does not mention {missing:?}");
+    assert!(missing.is_empty(), "docs/language does not mention {missing:?}");
 }

@@ -1,4 +1,4 @@
-//! docs/learners.md has each setting of each agent that learns, and the values of each preset.
+//! docs/reference/settings.md has each setting of each agent that learns, and the values of each preset.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use avastra::agent::{Kind, REGISTRY, Settings};
 
-const PAGE: &str = "docs/learners.md";
+const PAGE: &str = "docs/reference/settings.md";
 /// What stands before the table of values, which ends the page.
 const HEAD: &str = "A policy names its preset in `preset`; the other settings are:\n\n";
 

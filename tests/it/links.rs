@@ -225,7 +225,7 @@ const ATTACKS: &[Attack] = &[
     linked(&[("out/space", "folder")], &["export", "--to", "ava", "FOUND", "--out", "out"], Refused(LINK)),
     linked(&[("build", "folder")], &["compile", "SPACE"], Refused(LINK)),
     linked(&[("fresh/roads", "folder")], &["new", "fresh"], Refused(LINK)),
-    linked(&[("ed/syntaxes", "folder")], &["editor-files", "ed"], Refused(LINK)),
+    linked(&[("ed/docs", "folder")], &["editor-files", "ed"], Refused(LINK)),
     changed(&[("theirs/imported", "folder")], own_import, &["import", "theirs/cut_in.xosc"], Refused(LINK)),
     // Folders that are links, on the way to what is named.
     changed(&CRITICAL, critical_elsewhere, &["export", "--to", "csv", "FOUND"], Refused(WAY)),
@@ -574,7 +574,7 @@ fn pages_written_at_once_and_to_a_full_disk_leave_nothing_behind() {
     let full = std::process::Command::new("sh").args(["-c", &script]).output().expect("it starts");
     let stderr = String::from_utf8_lossy(&full.stderr);
     assert!(full.status.code() == Some(1) && stderr.contains("cannot write"), "{stderr}");
-    assert_eq!(names(), ["critical", "run.db", "run.yaml", "space"]);
+    assert_eq!(names(), ["critical", "kept", "run.db", "run.yaml", "space"]);
     std::thread::scope(|scope| {
         for _ in 0..3 {
             scope.spawn(|| {
@@ -582,7 +582,7 @@ fn pages_written_at_once_and_to_a_full_disk_leave_nothing_behind() {
             });
         }
     });
-    assert_eq!(names(), ["critical", "report.html", "run.db", "run.yaml", "space"]);
+    assert_eq!(names(), ["critical", "kept", "report.html", "run.db", "run.yaml", "space"]);
     let page = std::fs::read_to_string(run.join("report.html")).expect("it is there");
     assert!(page.trim_end().ends_with("</html>"), "the page is whole");
 }

@@ -3,6 +3,7 @@
 
 mod agents;
 mod alarms;
+mod book;
 mod cases;
 mod catalogue;
 mod circles;
@@ -55,7 +56,6 @@ mod tables;
 mod told;
 mod traces;
 mod torch;
-mod tour;
 mod training;
 mod traffic;
 mod trials;

@@ -362,7 +362,7 @@ fn the_data_of_a_page_has_the_shapes_that_its_modules_read() {
 /// `sh scenarios/found/make.sh` draws it again, should the engine or the driving system change.
 #[test]
 fn the_picture_of_the_readme_is_of_its_scenario() {
-    let found = "scenarios/found/boulevard_0300";
+    let found = "scenarios/found/residential_0046";
     done(&["replay", &format!("{found}.ava")]);
     let drawn = done(&["render", &format!("{found}.ava"), "--strip", "--out", "-"]);
     let kept = std::fs::read_to_string(root().join(format!("{found}.svg"))).expect("it is shipped");

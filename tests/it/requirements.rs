@@ -641,7 +641,7 @@ fn a_breach_is_a_finding_that_replays() {
     assert!(smaller.contains("  expect slow.breached at ") && smaller.len() < text.len(), "{smaller}");
     assert!(done(&["replay", &shrunk]).contains(" holds, "));
     let (status, ..) = outcome(
-        avastra(&run).args(["--fail-on-breach", "--quiet"]).arg("--out").arg(scratch.path().join("again")),
+        avastra(&run).args(["--fail-on", "breach", "--quiet"]).arg("--out").arg(scratch.path().join("again")),
     );
     assert_eq!(status, 4);
 

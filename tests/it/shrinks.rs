@@ -33,7 +33,7 @@ fn what_a_breach_needs_is_kept() {
     };
     let mut all = found("words", &["--with", "few_words", "--episodes", "2"]);
     // What does not come back is not exchanged for something else.
-    let other = scratch.path().join("other.ava");
+    let other = all[0].with_file_name("other.ava");
     let text = std::fs::read_to_string(&all[0]).expect("it was written");
     std::fs::write(&other, text.replace("expect few_words.", "expect keeps_away.")).expect("it is writable");
     fails(

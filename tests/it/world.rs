@@ -40,7 +40,7 @@ impl Surroundings for Wide {
 
 /// Reads a file as the command line does.
 pub fn read(path: &Path) -> Result<String, ReadError> {
-    std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()))
+    std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string()))
 }
 
 /// Loads a text as if it were a file of the repository.

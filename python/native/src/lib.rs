@@ -11,7 +11,15 @@ mod space;
 mod step_all;
 mod tables;
 
+use std::ffi::OsString;
+
 use pyo3::prelude::*;
+
+/// Runs the command `avastra` with a command line, whose first word is the program's name; its exit status.
+#[pyfunction]
+fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
+    py.detach(|| avastra::cli::main_of(words))
+}
 
 /// The engine of avastra.
 #[pymodule]
@@ -19,6 +27,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("ENGINE", avastra::sim::ENGINE)?;
     module.add("SpaceError", module.py().get_type::<diagnostics::SpaceError>())?;
     module.add("EpisodeError", module.py().get_type::<episodes::EpisodeError>())?;
+    module.add_function(wrap_pyfunction!(main, module)?)?;
     module.add_class::<space::Space>()?;
     module.add_class::<space::Variable>()?;
     module.add_class::<episodes::Episodes>()?;

@@ -870,7 +870,7 @@ mod tests {
             let made_up = folder.join("made_up.ava");
             let read = |path: &Path| match path.ends_with("made_up.ava") {
                 true => Ok(text.clone()),
-                false => std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string())),
+                false => std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string())),
             };
             let loaded = load(&made_up, &read).expect("it can be read");
             let Some(space) = loaded.space else { panic!("{:?}", loaded.diagnostics) };

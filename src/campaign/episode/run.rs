@@ -546,7 +546,7 @@ rule never on dry: ego.speed > 60 m/s
     fn setup() -> Setup {
         let read = |path: &Path| match path.ends_with("taped.ava") {
             true => Ok(SPACE.to_owned()),
-            false => std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string())),
+            false => std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string())),
         };
         let loaded = load(Path::new("taped.ava"), &read).unwrap();
         let space = loaded.space.unwrap_or_else(|| panic!("{:?}", loaded.diagnostics));

@@ -10,7 +10,7 @@ use crate::estimate::plan::{Cell, Pilot, Seen, Situation};
 use crate::estimate::ready::Estimate;
 
 /// Versions begin at 2001, so that it is never taken for another database.
-const LAYOUT: Layout = Layout {
+pub(crate) const LAYOUT: Layout = Layout {
     version: 2004,
     schema: || SCHEMA.to_owned(),
     unit: "part",

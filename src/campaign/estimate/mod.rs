@@ -18,6 +18,7 @@ mod results;
 mod settings;
 
 pub use compare::{Comparison, ComparisonResults, Pair, Side, compared};
+pub(crate) use database::LAYOUT;
 pub use database::{EstimateDatabase, PILOT};
 pub use part::{Event, Met, Part, PartRecord, Played, play_parts};
 pub use plan::{Pilot, Plan};

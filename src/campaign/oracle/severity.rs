@@ -77,21 +77,17 @@ const WALKING_MPS: f64 = 1.4;
 /// The speed of an impact, and that at which one in ten is seriously injured, m/s. Cars of unequal mass are hit as if by their
 /// like at twice the larger delta-v.
 fn harm(severity: &Severity, body: Body) -> (f64, f64) {
-    let car_mps = 2.0 * severity.delta_v_mps.max(severity.obstacle_delta_v_mps);
     let is_side = matches!(severity.side, "left" | "right") || severity.approach.starts_with("from");
+    let of_mps = |delta_v_mps: f64| (2.0 * delta_v_mps, if is_side { SIDE_MPS } else { FRONT_MPS });
     match body {
         Body::Pedestrian => (severity.closing_speed_mps, PEDESTRIAN_MPS),
         Body::Bicycle => (severity.closing_speed_mps, CYCLIST_MPS),
         Body::Motorcycle => (severity.closing_speed_mps, MOTORCYCLIST_MPS),
-        // In a crash with an animal or a thing, the people in the ego vehicle count.
-        Body::Animal
-        | Body::Object
-        | Body::BoxTruck
-        | Body::SchoolBus
-        | Body::Jeep
-        | Body::Sedan
-        | Body::SUV
-        | Body::Hatchback => (car_mps, if is_side { SIDE_MPS } else { FRONT_MPS }),
+        // Only the ego vehicle has people in it.
+        Body::Animal | Body::Object => of_mps(severity.delta_v_mps),
+        Body::BoxTruck | Body::SchoolBus | Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback => {
+            of_mps(severity.delta_v_mps.max(severity.obstacle_delta_v_mps))
+        }
     }
 }
 
@@ -181,6 +177,10 @@ mod tests {
             assert!((found.delta_v_mps + found.obstacle_delta_v_mps - 4.0).abs() < 1e-12);
             let (ego_t, other_t) = (VehicleParameters::MKZ.mass_t, parameters(body).mass_t);
             assert!((ego_t * found.delta_v_mps - other_t * found.obstacle_delta_v_mps).abs() < 1e-9);
+            let share = |body| harm(&found, body).0;
+            // What the others in it would feel does not count where there are none.
+            assert!((share(Body::Object) - 2.0 * found.delta_v_mps).abs() < 1e-12);
+            assert!(share(Body::Sedan) >= share(Body::Object));
         }
     }
 }

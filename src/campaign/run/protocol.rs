@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::run::database::Database;
 use crate::run::sealed::{DatabaseError, query_all};
-use avastra_lang::model::Space;
+use avastra_base::units::{Dimension, decimal};
+use avastra_lang::model::{Space, Type};
 
 /// Below this time to collision or post-encroachment time a drive without a contact is a near miss, s: the threshold of traffic
 /// conflicts (Hydén 1987; the default of FHWA's SSAM, 2008).
@@ -322,7 +323,7 @@ fn said(text: &str) -> (String, Vec<(String, String)>) {
 /// How often each ending came, in the order of [`Ending::ALL`], and the speeds of contacts.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Tally {
-    pub endings: [u32; 5],
+    pub endings: [u32; Ending::ALL.len()],
     /// Tests with a breach.
     pub breached: u32,
     /// Means over contacts, m/s: the speed of the two against each other, that of the ego vehicle, and what this lost of its
@@ -330,6 +331,8 @@ pub struct Tally {
     pub relative_mps: Option<f64>,
     pub impact_mps: Option<f64>,
     pub reduction_mps: Option<f64>,
+    /// The names that scenarios of their episodes have, of those in which something came of the action.
+    pub scenarios: Vec<String>,
 }
 
 impl Tally {
@@ -341,6 +344,9 @@ impl Tally {
                 tally.endings[ending as usize] += 1;
             }
             tally.breached += u32::from(!test.breached.is_empty());
+            if test.ending != Some(Ending::Avoided) || !test.breached.is_empty() {
+                tally.scenarios.push(format!("{}_{:04}", test.road, test.episode));
+            }
             relatives.extend(test.relative_mps);
             impacts.extend(test.impact_mps);
             reductions.extend(test.reduction_mps());
@@ -361,6 +367,8 @@ impl Tally {
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct HeatMap {
     pub action: String,
+    /// What its documentation says of it; empty without one.
+    pub about: String,
     /// The parameter of each axis; the second is empty if there is none.
     pub down: String,
     pub across: String,
@@ -423,7 +431,35 @@ fn heat_map(
     let line = |row| (0..columns.labels.len()).map(|column| cell(row, column)).collect();
     let cells = (0..rows.labels.len()).map(line).collect();
     let [action, down, across] = [title, down, across].map(str::to_owned);
-    Some(HeatMap { action, down, across, rows: rows.labels, columns: columns.labels, cells })
+    let (rows, columns, about) = (rows.labels, columns.labels, String::new());
+    Some(HeatMap { action, about, down, across, rows, columns, cells })
+}
+
+impl HeatMap {
+    /// The map with the words of the space: the action's documentation, and shares in per cent.
+    pub fn told_by(mut self, space: &Space) -> HeatMap {
+        let Some(action) = space.actions.iter().find(|action| action.name == self.action) else {
+            return self;
+        };
+        self.about = action.docs.join(" ").trim().to_owned();
+        let is_share = |name: &str| {
+            let parameter = action.parameters.iter().find(|parameter| &*parameter.name == name);
+            parameter.is_some_and(|parameter| parameter.ty == Type::Quantity(Dimension::RATIO))
+        };
+        for (name, labels) in [(&self.down, &mut self.rows), (&self.across, &mut self.columns)] {
+            let numbers: Option<Vec<f64>> = labels.iter().map(|label| label.parse().ok()).collect();
+            // Other numbers without a unit are counts, speeds without their unit and the like.
+            let is_share = is_share(name)
+                && numbers.as_ref().is_some_and(|all| {
+                    all.iter().all(|share| share.abs() <= 1.0) && all.iter().any(|share| share.fract() != 0.0)
+                });
+            if let Some(numbers) = numbers.filter(|_| is_share) {
+                *labels =
+                    numbers.iter().map(|share| format!("{} %", decimal(share * 100.0, false))).collect();
+            }
+        }
+        self
+    }
 }
 
 /// The word for the action among parameters; no parameter has this name, since it is a keyword.
@@ -566,7 +602,7 @@ mod tests {
         let tally = map.cells[0][1].clone().expect("two were tried");
         assert_eq!(
             (tally.endings, tally.impact_mps, tally.reduction_mps),
-            ([0, 0, 0, 2, 0], Some(5.0), Some(5.0))
+            ([0, 0, 0, 2, 0, 0], Some(5.0), Some(5.0))
         );
         assert!(heat_maps(&tests, "speed", "colour").is_empty());
         assert_eq!(heat_maps(&tests, "speed", "")[0].columns, [""]);

@@ -101,8 +101,9 @@ pub struct RunSettings {
     #[serde(default)]
     pub replays: u32,
     /// Episodes in which nothing was found that are kept as scenarios, too: collisions that do not count, then the nearest misses.
-    #[serde(default)]
-    pub keep: u32,
+    /// `None`: some, if the whole run found nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub keep: Option<u32>,
     /// How the avoidability of collisions is judged: in one way, of which this is the record.
     #[serde(default)]
     pub avoidability: AvoidabilitySettings,
@@ -130,7 +131,7 @@ impl RunSettings {
             seed,
             causes: false,
             replays: 0,
-            keep: 0,
+            keep: None,
             avoidability: AvoidabilitySettings::default(),
         }
     }

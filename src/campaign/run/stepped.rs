@@ -160,7 +160,8 @@ mod tests {
 
     /// A run of twelve episodes on the crossroad.
     fn run(ads: &str) -> Arc<Run> {
-        let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
+        let read =
+            |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string()));
         let loaded = load(Path::new("../../scenarios/avastra45.ava"), &read).unwrap();
         let space = loaded.space.unwrap();
         let roads = vec!["crossroad".to_owned()];

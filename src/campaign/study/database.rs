@@ -12,7 +12,7 @@ use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureCl
 use crate::study::settings::StudySettings;
 
 /// Versions begin at 1001, so that a `run.db` is never taken for a `study.db`.
-const LAYOUT: Layout = Layout {
+pub(crate) const LAYOUT: Layout = Layout {
     version: 1007,
     schema: || SCHEMA.to_owned(),
     unit: "cell",

@@ -32,6 +32,7 @@ mod reuse;
 mod settings;
 
 pub use agreement::{Agreement, ComparedFigure, ComparedPair, P_MAX, Verdict};
+pub(crate) use database::LAYOUT;
 pub use database::StudyDatabase;
 pub use failed::FailedCell;
 pub use file::{PublishedTable, StudyFile};

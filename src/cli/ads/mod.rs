@@ -33,7 +33,7 @@ fn schema(output: &Output) {
     let document = serde_json::json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": avastra_drivers::external::PROTOCOL,
-        "description": "A line of avastra-ads/1 is one of these; PROTOCOL.md says which, when and what it means.",
+        "description": "A line of avastra-ads/1 is one of these; the page of the protocol says which, when and what it means.",
         "oneOf": alternatives, "$defs": messages,
     });
     output.document(&serde_json::to_string_pretty(&document).expect("schemas are plain data"));

@@ -1,6 +1,6 @@
 //! `avastra ads toy`: a small driving system at the other end of the protocol, to try avastra with before one's own is
 //! ready. It keeps to the route and brakes for what is ahead. On demand it does each of the things wrong for which
-//! PROTOCOL.md has a name.
+//! docs/reference/protocol.md has a name.
 
 use std::io::{BufRead, Write, stdin, stdout};
 use std::time::Duration;

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
 
 use super::language::RuleArguments;
 use crate::cli::help::Named;
@@ -17,7 +17,7 @@ pub const REPLAYS: u32 = 20;
 /// The driving system under test.
 #[derive(Debug, Args)]
 pub struct UnderTestArguments {
-    /// Driving system under test: a name; a profile of `modular` or of one of your own (PROTOCOL.md), a YAML file; a command
+    /// Driving system under test: a name; a profile of `modular` or of a program of your own, a YAML file; a command
     /// that starts your own, `tcp:HOST:PORT` or `unix:PATH`.
     #[arg(long, value_name = "NAME|FILE|COMMAND", default_value = avastra_campaign::run::DEFAULT_ADS, value_parser = Named::ADS)]
     pub ads: String,
@@ -83,9 +83,9 @@ pub struct RunArguments {
     #[arg(long, value_name = "N", default_value_t = REPLAYS, value_parser = clap::value_parser!(u32).range(0..=i64::from(avastra_lang::model::REPLAYS_MAX)))]
     pub replays: u32,
     /// Keep N episodes in which nothing was found as scenarios in `kept`, too: first those with a collision that does not count,
-    /// then the nearest misses.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=1000))]
-    pub keep: u32,
+    /// then the nearest misses [default: 3 if a run of an embedded driving system found nothing, else 0].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1000))]
+    pub keep: Option<u32>,
     /// Worker threads; the result does not depend on it [default: one for each core].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
@@ -100,12 +100,18 @@ pub struct RunArguments {
     /// Go on with an interrupted run directory; its own settings hold, and the program that they name is started.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "replays", "keep", "out", "self_contained", "shard", "dry_run", "without", "with"])]
     pub resume: Option<PathBuf>,
-    /// Exit with status 4 if a counted collision was found.
-    #[arg(long)]
-    pub fail_on_collision: bool,
-    /// Exit with status 4 if a requirement of the space was breached.
-    #[arg(long)]
-    pub fail_on_breach: bool,
+    /// Exit with status 4 if this was found: `recurring` (a counted collision or a breach that recurs), `collision` (any that
+    /// counts), `breach` (any). With it, a failure of a driving system of your own in any episode exits with status 5.
+    #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',')]
+    pub fail_on: Vec<FailOn>,
+}
+
+/// What a continuous build fails on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum FailOn {
+    Recurring,
+    Collision,
+    Breach,
 }
 
 #[derive(Debug, Args)]

@@ -12,7 +12,7 @@ pub struct AdsArguments {
 
 #[derive(Debug, Subcommand)]
 pub enum AdsCommand {
-    /// Check that a driving system follows PROTOCOL.md, answers alike to the like, and how fast.
+    /// Check that a driving system follows the protocol and gives equal answers to equal questions, and how fast it is.
     Check(AdsCheckArguments),
     /// Print the JSON Schema of every message.
     Schema,

@@ -21,7 +21,7 @@ pub struct TrainArguments {
     /// Who learns.
     #[arg(long, default_value = "ddqn", value_parser = Named::TRAINED)]
     pub agent: String,
-    /// Settings to begin with, see docs/learners.md; searches have none [default: the agent's first].
+    /// Settings to begin with, see docs/reference/settings.md; searches have none [default: the agent's first].
     #[arg(long, value_parser = Named::PRESET)]
     pub preset: Option<String>,
     /// Settings that differ from the preset, as YAML.

@@ -8,7 +8,7 @@ mod scenarios;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-pub use drive::{ConditionArguments, EstimateArguments, MergeArguments, REPLAYS, RunArguments};
+pub use drive::{ConditionArguments, EstimateArguments, FailOn, MergeArguments, REPLAYS, RunArguments};
 pub use external::{AdsArguments, AdsCheckArguments, AdsCommand, Misbehaviour, ToyAnswer, ToyArguments};
 pub use language::{
     CheckArguments, CompileArguments, CompletionsArguments, DiffArguments, Dump, EditorFilesArguments,
@@ -140,7 +140,7 @@ mod tests {
     use super::Arguments;
 
     /// What may be said anew when a directory is gone on with: it changes no result.
-    const ANEW: [&str; 6] = ["resume", "jobs", "reuse", "fail_on_collision", "fail_on_breach", "help"];
+    const ANEW: [&str; 5] = ["resume", "jobs", "reuse", "fail_on", "help"];
 
     #[test]
     fn a_directory_that_is_gone_on_with_keeps_its_settings() {

@@ -7,7 +7,7 @@ use avastra_base::outside::{acts_on_terminal, in_line};
 use super::words::words;
 
 words! {
-    /// The kinds of findings; PROTOCOL.md, "What goes wrong". A name is also that of an episode's end.
+    /// The kinds of findings; docs/reference/protocol.md, "What goes wrong". A name is also that of an episode's end.
     pub enum FailureKind {
         Crash = "ads_crash",
         Timeout = "ads_timeout",
@@ -55,11 +55,11 @@ problems! {
     NotJson = "not_json": Protocol,
         "print nothing but messages on standard output: send prints, also those of libraries, to standard error";
     TooLong = "too_long": Protocol, "a line has at most 1 MiB: send fewer points";
-    WrongType = "wrong_type": Protocol, "compare the message with PROTOCOL.md or `avastra ads schema`";
-    WrongShape = "wrong_shape": Protocol, "compare the message with PROTOCOL.md or `avastra ads schema`";
+    WrongType = "wrong_type": Protocol, "compare the message with `avastra ads schema`";
+    WrongShape = "wrong_shape": Protocol, "compare the message with `avastra ads schema`";
     NotFinite = "not_finite": Protocol,
         "test for NaN before answering; in Python, `json.dumps(…, allow_nan=False)` finds the place";
-    OutOfRange = "out_of_range": Protocol, "compare the message with PROTOCOL.md or `avastra ads schema`";
+    OutOfRange = "out_of_range": Protocol, "compare the message with `avastra ads schema`";
     WrongSeq = "wrong_seq": Protocol, "repeat the `seq` of the step in its answer";
     Twice = "twice": Protocol, "answer each step once, and no `event`";
     WrongProtocol = "wrong_protocol": Protocol, "this avastra speaks avastra-ads/1";
@@ -152,7 +152,7 @@ mod tests {
         assert_eq!(failure.stderr_lines(3), lines);
     }
 
-    const PROTOCOL: &str = include_str!("../../../PROTOCOL.md");
+    const PROTOCOL: &str = include_str!("../../../docs/reference/protocol.md");
 
     #[test]
     fn the_specification_names_every_finding_and_no_other() {

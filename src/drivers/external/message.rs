@@ -1,4 +1,4 @@
-//! The messages of avastra-ads/1, as PROTOCOL.md has them. Their JSON Schemas follow from the types here (`schema`).
+//! The messages of avastra-ads/1, as docs/reference/protocol.md has them. Their JSON Schemas follow from the types here (`schema`).
 
 use serde::{Deserialize, Serialize};
 
@@ -675,7 +675,7 @@ mod tests {
 
     #[test]
     fn the_examples_of_the_specification_are_whole_messages() {
-        let text = include_str!("../../../PROTOCOL.md");
+        let text = include_str!("../../../docs/reference/protocol.md");
         let mut words = Vec::new();
         for line in text.lines().filter(|line| line.starts_with("{\"type\"")) {
             let value: Value = serde_json::from_str(line).expect(line);

@@ -1,4 +1,4 @@
-//! Driving systems outside this program: any program that speaks avastra-ads/1 (PROTOCOL.md) over pipes or a socket.
+//! Driving systems outside this program: any program that speaks avastra-ads/1 (docs/reference/protocol.md) over pipes or a socket.
 //!
 //! `message` has the messages and `question` fills those that are asked; `link` moves lines, `session` speaks with one
 //! process, `program` keeps the processes and the known answers, and `driver` is one episode. An error of a driving

@@ -10,7 +10,7 @@ use avastra_world::sim::{DT_S, FRAME_S};
 
 use super::message::{AnswerKind, Observation};
 
-/// The settings of an external driving system; PROTOCOL.md, "The profile".
+/// The settings of an external driving system; docs/reference/protocol.md, "The profile".
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExternalSettings {

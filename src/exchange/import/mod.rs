@@ -1,4 +1,4 @@
-//! OpenSCENARIO XML of others as spaces of the language (LANGUAGE.md has what is read).
+//! OpenSCENARIO XML of others as spaces of the language (docs/reference/openscenario.md has what is read).
 //!
 //! A scenario becomes a space with one row, and a scenario that plays it. A file with a `ParameterValueDistribution`
 //! becomes a space with a row for each of its variations. Others follow their ways as the file's player moves them

@@ -16,7 +16,7 @@ const ONE: &str = "?";
 const ANY: &str = "*";
 
 /// Each element with its attributes in brackets, and its children. `~`: the attribute may change what the file means and is not read,
-/// so that a note says it where it stands. `-`: nothing that is taken over depends on it. docs/formats.md is the same table.
+/// so that a note says it where it stands. `-`: nothing that is taken over depends on it. docs/reference/formats.md is the same table.
 const ELEMENTS: &str = "
     OpenSCENARIO [] FileHeader ParameterDeclarations VariableDeclarations MonitorDeclarations CatalogLocations
         RoadNetwork Entities Storyboard ParameterValueDistribution;

@@ -102,9 +102,9 @@ fn conditions(settings: &str) -> Vec<(&'static str, String)> {
     let program = of.external.as_ref().map(Attached::name);
     let driver = match &of.profile {
         None => program.unwrap_or(of.ads),
-        Some(profile) => match profile.settings.to_line() {
-            line if line.is_empty() => format!("{}, default profile", of.ads),
-            line => format!("{} {line}", of.ads),
+        Some(profile) => match profile.settings.in_words() {
+            changes if changes.is_empty() => format!("{}, default profile", of.ads),
+            changes => format!("{} with {changes}", of.ads),
         },
     };
     // A profile of the author's own is told by what it changes.

@@ -31,6 +31,7 @@ const MODULES: &[&str] = &[
     include_str!("page/axis.js"),
     include_str!("page/plots.js"),
     include_str!("page/strip.js"),
+    include_str!("page/thumbs.js"),
     include_str!("page/source.js"),
     include_str!("page/facts.js"),
     include_str!("page/clock.js"),

@@ -24,8 +24,12 @@ use super::words;
 const PANEL_PX: f64 = 400.0;
 /// Panels side by side.
 const COLUMNS: usize = 5;
-/// Heights of the title above all panels, the caption under each, and the legend under all, px.
-const TITLE_PX: f64 = 30.0;
+/// Heights of a line of the title above all panels, of the room around it, of the caption under each, and of the legend under
+/// all, px.
+const TITLE_LINE_PX: f64 = 20.0;
+const TITLE_ROOM_PX: f64 = 10.0;
+/// The mean width of a letter of the title, px: wider than most, so that a line fits.
+const TITLE_LETTER_PX: f64 = 8.4;
 const CAPTION_PX: f64 = 62.0;
 const LEGEND_PX: f64 = 24.0;
 /// How far a panel reaches from its centre in each direction, m: at least and at most.
@@ -65,19 +69,24 @@ pub fn picture(moments: &[Snapshot], subject: &Subject) -> String {
     let columns = moments.len().clamp(1, COLUMNS);
     let rows = moments.len().max(1).div_ceil(columns);
     let width_px = PANEL_PX * columns as f64;
-    let height_px = TITLE_PX + (PANEL_PX + CAPTION_PX) * rows as f64 + LEGEND_PX;
+    let lines = folded(&subject.title, ((width_px - 12.0) / TITLE_LETTER_PX) as usize);
+    let title_px = TITLE_LINE_PX * lines.len() as f64 + TITLE_ROOM_PX;
+    let height_px = title_px + (PANEL_PX + CAPTION_PX) * rows as f64 + LEGEND_PX;
     let mut svg = String::new();
     let title = in_markup(&subject.title);
     let _ = writeln!(
         svg,
         r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width_px}" height="{height_px}" viewBox="0 0 {width_px} {height_px}" font-family="sans-serif" role="img">
 <title>{title}</title>
-<rect width="100%" height="100%" fill="#ffffff"/>
-<text x="6" y="20" font-size="15" font-weight="bold" fill="#14181f">{title}</text>"##
+<rect width="100%" height="100%" fill="#ffffff"/>"##
     );
+    for (index, line) in lines.iter().enumerate() {
+        let place = (6.0, TITLE_LINE_PX * (index + 1) as f64);
+        write_text(&mut svg, place, r##"font-size="15" font-weight="bold" fill="#14181f""##, line);
+    }
     for (index, moment) in moments.iter().enumerate() {
         let left_px = PANEL_PX * (index % columns) as f64;
-        let top_px = TITLE_PX + (PANEL_PX + CAPTION_PX) * (index / columns) as f64;
+        let top_px = title_px + (PANEL_PX + CAPTION_PX) * (index / columns) as f64;
         let _ = writeln!(
             svg,
             r##"<svg x="{left_px}" y="{top_px}" width="{PANEL_PX}" height="{PANEL_PX}"><rect width="100%" height="100%" fill="#e6ece0"/>"##
@@ -93,6 +102,23 @@ pub fn picture(moments: &[Snapshot], subject: &Subject) -> String {
     write_text(&mut svg, (6.0, height_px - 8.0), r##"font-size="12" fill="#5a6372""##, legend);
     svg.push_str("</svg>\n");
     svg
+}
+
+/// A text in lines of at most so many letters, broken between words.
+fn folded(text: &str, letters: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let line = lines.last_mut().expect("there is one");
+        if line.is_empty() {
+            line.push_str(word);
+        } else if line.chars().count() + 1 + word.chars().count() <= letters {
+            line.push(' ');
+            line.push_str(word);
+        } else {
+            lines.push(word.to_owned());
+        }
+    }
+    lines
 }
 
 /// Draws in world coordinates around what matters.

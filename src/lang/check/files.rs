@@ -7,8 +7,34 @@ use crate::syntax::ast::Span;
 
 /// Why a file cannot be read, in a few words: `no such file`, `a directory`, `not text`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct ReadError(pub String);
+#[error("{reason}")]
+pub struct ReadError {
+    reason: String,
+    /// Whether nothing is there.
+    pub is_missing: bool,
+}
+
+impl ReadError {
+    pub fn new(reason: impl Into<String>) -> ReadError {
+        ReadError { reason: reason.into(), is_missing: false }
+    }
+
+    /// The error of a path at which nothing is.
+    pub fn missing(reason: impl Into<String>) -> ReadError {
+        ReadError { reason: reason.into(), is_missing: true }
+    }
+}
+
+/// Files that avastra has within itself: `use "law.ava"` finds them where no file of that name is.
+const BUILT_IN: [(&str, &str); 2] = [
+    ("law.ava", include_str!("../shipped/law.ava")),
+    ("comfort.ava", include_str!("../shipped/comfort.ava")),
+];
+
+/// The text of a file that is built in, by its path as a `use` writes it.
+pub fn built_in(written: &str) -> Option<&'static str> {
+    BUILT_IN.iter().find(|(name, _)| *name == written).map(|(_, text)| *text)
+}
 
 /// Gives the text of a file.
 pub type ReadFile<'a> = dyn Fn(&Path) -> Result<String, ReadError> + 'a;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use crate::check::checker::{Checked, DIAGNOSTICS_MAX, Maps, Root, Runs};
 use crate::check::files::{
-    LoadedFile, ReadError, ReadFile, folder, maps_named, normal, path_from, used_path, uses,
+    LoadedFile, ReadError, ReadFile, built_in, folder, maps_named, normal, path_from, used_path, uses,
 };
 use crate::check::meaning::meaning;
 use crate::check::references::References;
@@ -372,6 +372,16 @@ impl<'a> Loader<'a> {
         Ok(loader)
     }
 
+    /// Reads a file that another one uses. A file that avastra has within itself need not be there.
+    fn read_used(&mut self, written: &str, path: &Path, way: &mut Vec<PathBuf>) -> Result<(), ReadError> {
+        let done = self.read_file(path, way);
+        let is_missing = done.as_ref().is_err_and(|error| error.is_missing);
+        match built_in(written).filter(|_| is_missing) {
+            Some(text) => self.add_file(path, text.to_owned(), None, way),
+            None => done,
+        }
+    }
+
     /// Reads a file and the files that it uses. `way` holds the files from the root to this one.
     fn read_file(&mut self, path: &Path, way: &mut Vec<PathBuf>) -> Result<(), ReadError> {
         if self.files.iter().any(|file| file.path == path) {
@@ -382,12 +392,24 @@ impl<'a> Loader<'a> {
             Some(KnownFile { text, tree, diagnostics }) => (text, Some((tree, diagnostics))),
             None => ((self.read)(path)?, None),
         };
+        self.add_file(path, text, parsed, way)
+    }
+
+    /// Adds a file, which may be parsed already, and reads the files that it uses.
+    fn add_file(
+        &mut self,
+        path: &Path,
+        text: String,
+        parsed: Option<(ast::File, Vec<Diagnostic>)>,
+        way: &mut Vec<PathBuf>,
+    ) -> Result<(), ReadError> {
+        let place = (self.files.len(), path.to_owned());
         self.words += words(&text);
         // The parser says it of a root that is too long by itself.
         if self.words > WORDS_MAX && !self.files.is_empty() {
             let message =
                 format!("with it, the files of the space have more than {WORDS_MAX} words and signs");
-            return Err(ReadError(message));
+            return Err(ReadError::new(message));
         }
         let file = self.sources.add(path.to_string_lossy(), text);
         let (tree, found) = parsed.unwrap_or_else(|| parse(file, self.sources.text(file)));
@@ -417,7 +439,7 @@ impl<'a> Loader<'a> {
                 self.diagnostics.push(error.help("move what both need into a file that uses neither"));
                 continue;
             }
-            if let Err(error) = self.read_file(&target, way) {
+            if let Err(error) = self.read_used(&used.path.value, &target, way) {
                 let message = format!("cannot read `{}`", target.shown());
                 self.diagnostics
                     .push(Diagnostic::error(code::UNREADABLE, message).at(used.path.span, error.to_string()));

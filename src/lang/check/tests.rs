@@ -46,7 +46,7 @@ fn read(files: &[(&str, &str)], path: &Path) -> Result<String, ReadError> {
     match files.iter().find(|(name, _)| Path::new(name) == path) {
         Some((_, text)) => Ok((*text).to_owned()),
         None if path.ends_with("corner.xodr") => Ok(std::fs::read_to_string(map).unwrap()),
-        None => Err(ReadError("no such file".to_owned())),
+        None => Err(ReadError::missing("no such file")),
     }
 }
 

@@ -219,149 +219,149 @@ const FROM_0: RangeInclusive<f64> = 0.0..=f64::INFINITY;
 // Policies have variables of their own (`policy::VARIABLES`): what an agent observes is rounded and cut off.
 facts! {
     RoadLimit "road.limit" SPEED, Road, road.limit_mps =
-        "A `Speed`: the lowest limit along the route.", FROM_0;
+        "`Speed`: lowest speed limit along the route.", FROM_0;
     EgoSpeed "ego.speed" SPEED, World, moment.ego_speed_mps =
-        "A `Speed`: how fast the ego vehicle is.", 0.0..=SPEED_MPS_MAX;
+        "`Speed`: speed of the ego vehicle.", 0.0..=SPEED_MPS_MAX;
     EgoAcceleration "ego.acceleration" ACCEL, World, moment.ego_acceleration_mps2 =
-        "A `Accel`: of the ego vehicle, negative when it brakes.", -EGO_ACCELERATION_MPS2_MAX..=EGO_ACCELERATION_MPS2_MAX;
+        "`Accel`: acceleration along its heading. Below 0 it brakes.", -EGO_ACCELERATION_MPS2_MAX..=EGO_ACCELERATION_MPS2_MAX;
     EgoLimit "ego.limit" SPEED, World, moment.ego_limit_mps in Limit =
-        "A `Speed`: the limit of the lane that the ego vehicle is in.", FROM_0;
+        "`Speed`: speed limit of its lane.", FROM_0;
     EgoJunctionAhead "ego.junction_ahead" LENGTH, World, moment.ego_junction_ahead_m in Route =
-        "A `Length`: along the route to the next junction; 0 in one, 1000 m if there is none nearer.", 0.0..=JUNCTION_AHEAD_M_MAX;
+        "`Length`: distance along the route to the next junction: 0 in one, 1000 m if none is nearer.", 0.0..=JUNCTION_AHEAD_M_MAX;
     EgoJunctionEnd "ego.junction_end" LENGTH, World, moment.ego_junction_end_m in Route =
-        "A `Length`: along the route to the end of that junction; 1000 m if there is none nearer.", 0.0..=JUNCTION_AHEAD_M_MAX;
+        "`Length`: distance along the route to the end of that junction: 1000 m if none is nearer.", 0.0..=JUNCTION_AHEAD_M_MAX;
     EgoCrosswalkAhead "ego.crosswalk_ahead" LENGTH, World, moment.ego_crosswalk_ahead_m in Crosswalks =
-        "A `Length`: along the route to the next crosswalk; 0 on one, 1000 m if there is none nearer.", 0.0..=JUNCTION_AHEAD_M_MAX;
+        "`Length`: distance along the route to the next crosswalk: 0 on one, 1000 m if none is nearer.", 0.0..=JUNCTION_AHEAD_M_MAX;
     EgoLaneWidth "ego.lane_width" LENGTH, World, moment.ego_lane_width_m in Route =
-        "A `Length`: of the route's lane at the ego vehicle.", FROM_0;
+        "`Length`: width of the route's lane at the ego vehicle.", FROM_0;
     EgoLightSince "ego.light_since" DURATION, World, moment.ego_light_times.since_s in Route =
-        "A `Duration`: since when the light of `ego.light` has its colour; 1000 s if there is none.", 0.0..=SINCE_S_MAX;
+        "`Duration`: time since the light of `ego.light` took its colour: 1000 s without a light.", 0.0..=SINCE_S_MAX;
     EgoLightLeft "ego.light_left" DURATION, World, moment.ego_light_times.left_s in Route =
-        "A `Duration`: until the light of `ego.light` changes; 1000 s if there is none.", 0.0..=SINCE_S_MAX;
+        "`Duration`: time until the light of `ego.light` changes: 1000 s without a light.", 0.0..=SINCE_S_MAX;
     EgoRouteLeft "ego.route_left" LENGTH, World, moment.ego_route_left_m in Route =
-        "A `Length`: along the route to the goal.";
+        "`Length`: distance along the route to the goal.";
     EgoOffset "ego.offset" LENGTH, World, moment.ego_offset_m =
-        "A `Length`: how far the ego vehicle is to the left of its route.";
+        "`Length`: lateral offset from the route, positive to the left.";
     EgoFront "ego.front" LENGTH, World, moment.ego_front_m =
-        "A `Length`: where the ego vehicle's front is along its route, whose start has 0 m.";
+        "`Length`: station of its front on the route, which begins at 0 m under its rear axle.";
     EgoRear "ego.rear" LENGTH, World, moment.ego_rear_m =
-        "A `Length`: where the ego vehicle's rear is along its route.";
+        "`Length`: station of its rear on the route. It is 4.70 m long and 2.06 m wide.";
     RoadUsers "road_users" Type::Int, World, moment.road_users in Users =
-        "A `Int`: how many there are beside the ego vehicle.", 0.0..=f64::from(COMMANDED_MAX + AMBIENT_MAX);
+        "`Int`: number of other road users: from actions (parked ones and wrecks included) and from ordinary traffic.", 0.0..=f64::from(COMMANDED_MAX + AMBIENT_MAX);
     RuleBreakers "rule_breakers" Type::Int, World, moment.rule_breakers in RuleBreakers =
-        "A `Int`: how many of them ignore a rule of the road, as a spawn or a command told them to.", 0.0..=f64::from(COMMANDED_MAX + AMBIENT_MAX);
+        "`Int`: how many of them drive and ignore a rule of the road. A wreck ignores none.", 0.0..=f64::from(COMMANDED_MAX + AMBIENT_MAX);
     NearestGap "nearest.gap" LENGTH, World, moment.nearest_gap_m in Users =
-        "A `Length`: to the nearest road user; 100 m if there is none.", FROM_0;
+        "`Length`: gap to the nearest road user: 100 m without one.", FROM_0;
     NearestSpeed "nearest.speed" SPEED, World, moment.nearest_speed_mps in Users =
-        "A `Speed`: of the nearest road user; 0 if there is none.", FROM_0;
+        "`Speed`: speed of the nearest road user: 0 without one.", FROM_0;
     Elapsed "elapsed" DURATION, World, moment.elapsed_s =
-        "A `Duration`: since the episode began.", FROM_0;
+        "`Duration`: time since the episode began.", FROM_0;
     StepNumber "step" Type::Int, World, world.step =
-        "A `Int`: the number of the step, from 0.", FROM_0;
+        "`Int`: number of the step, from 0.", FROM_0;
     NpcSpeed "npc.speed" SPEED, Spawn, npc.speed_mps =
-        "A `Speed`: of the road user that appears.", FROM_0;
+        "`Speed`: speed.", FROM_0;
     NpcAcceleration "npc.acceleration" ACCEL, Spawn, npc.acceleration_mps2 =
-        "A `Accel`: along its heading, negative when it brakes; 0 as it appears.";
+        "`Accel`: acceleration along its heading, over the last 0.02 s. Below 0 it brakes; 0 as it appears.";
     NpcGap "npc.gap" LENGTH, Spawn, npc.gap_m =
-        "A `Length`: from the road user that appears to the ego vehicle.", FROM_0;
+        "`Length`: gap between its outline and the ego vehicle's.", FROM_0;
     NpcJunctionAhead "npc.junction_ahead" LENGTH, Spawn, npc.junction_ahead_m =
-        "A `Length`: along its way to the next junction; 0 in one, 1000 m if there is none nearer.", 0.0..=JUNCTION_AHEAD_M_MAX;
+        "`Length`: distance from its middle along its way to the next junction: 0 in one, 1000 m if none is nearer.", 0.0..=JUNCTION_AHEAD_M_MAX;
     NpcCrossingAhead "npc.crossing_ahead" LENGTH, Spawn, npc.crossing_ahead_m =
-        "A `Length`: from a vehicle's front to where its way next crosses the ego vehicle's, or joins it; 1000 m if it does not.", 0.0..=JUNCTION_AHEAD_M_MAX;
+        "`Length`: distance from its front to the place where its way next crosses or joins the ego vehicle's: 1000 m if it does not, or if it is a pedestrian or on a trajectory.", 0.0..=JUNCTION_AHEAD_M_MAX;
     NpcEgoCrossingAhead "npc.ego_crossing_ahead" LENGTH, Spawn, npc.ego_crossing_ahead_m =
-        "A `Length`: from the ego vehicle's front to that place, below 0 behind it; 1000 m if there is none.";
+        "`Length`: distance from the ego vehicle's front to that place. Below 0 the ego vehicle is past it; 1000 m without one.";
     NpcLaneLeft "npc.lane_left" LENGTH, Spawn, npc.lane_left_m =
-        "A `Length`: from a vehicle's front to where its lane ends beside others that go on; 1000 m if it does not end sooner.";
+        "`Length`: distance from a vehicle's front to the end of its lane where others beside it go on, as at a merge lane: 1000 m if it does not end.";
     NpcLightSince "npc.light_since" DURATION, Spawn, npc.light_times.since_s =
-        "A `Duration`: since when the light of `npc.light` has its colour; 1000 s if there is none.", 0.0..=SINCE_S_MAX;
+        "`Duration`: as `ego.light_since`, for the light of `npc.light`.", 0.0..=SINCE_S_MAX;
     NpcLightLeft "npc.light_left" DURATION, Spawn, npc.light_times.left_s =
-        "A `Duration`: until the light of `npc.light` changes; 1000 s if there is none.", 0.0..=SINCE_S_MAX;
+        "`Duration`: as `ego.light_left`, for the light of `npc.light`.", 0.0..=SINCE_S_MAX;
     NpcLimit "npc.limit" SPEED, Spawn, npc.limit_mps =
-        "A `Speed`: the limit of the lane in which it appears.", FROM_0;
+        "`Speed`: speed limit of its lane.", FROM_0;
     NpcFront "npc.front" LENGTH, Spawn, npc.front_m =
-        "A `Length`: its end that is farthest along the ego vehicle's route.";
+        "`Length`: station on the ego vehicle's route of its end that is farther along, even when it is oncoming.";
     NpcRear "npc.rear" LENGTH, Spawn, npc.rear_m =
-        "A `Length`: its end that is least far along the ego vehicle's route.";
+        "`Length`: station on the ego vehicle's route of its other end.";
     NpcOffset "npc.offset" LENGTH, Spawn, npc.offset_m =
-        "A `Length`: how far its middle is to the left of the ego vehicle's route.";
+        "`Length`: lateral offset of its middle from the ego vehicle's route, positive to the left.";
     NpcTtc "npc.ttc" DURATION, Spawn, npc.ttc_s =
-        "A `Duration`: until it and the ego vehicle are beside each other at their present speeds; 0 if they are, 100 s if they do not get there sooner.", 0.0..=TIME_S_MAX;
+        "`Duration`: time until it and the ego vehicle are side by side along the route, at present speeds: 0 if they are, 100 s if not sooner. They need not touch.", 0.0..=TIME_S_MAX;
     NpcHeadway "npc.headway" DURATION, Spawn, npc.headway_s =
-        "A `Duration`: until whichever of it and the ego vehicle is behind, at its present speed, is where the other one is now; 100 s if not sooner.", 0.0..=TIME_S_MAX;
+        "`Duration`: distance between the two along the route, divided by the speed of the rear one: at most 100 s.", 0.0..=TIME_S_MAX;
     NpcAlong "npc.along" SPEED, Spawn, npc.along_mps =
-        "A `Speed`: along the ego vehicle's route, below 0 of one that comes towards it.";
+        "`Speed`: speed along the ego vehicle's route. Below 0 it comes towards the ego vehicle.";
     NpcAcross "npc.across" SPEED, Spawn, npc.across_mps =
-        "A `Speed`: to the left across the ego vehicle's route, below 0 to the right.";
+        "`Speed`: speed across the ego vehicle's route, positive to the left.";
     NpcAside "npc.aside" LENGTH, Spawn, npc.aside_m =
-        "A `Length`: the room between its outline and the ego vehicle's, across the route; below 0 they overlap.";
+        "`Length`: lateral gap between the two outlines, each at its full width across the route. Below 0 they overlap.";
     NpcInLane "npc.in_lane" LENGTH, Spawn, npc.in_lane_m =
-        "A `Length`: how far its outline reaches into the ego vehicle's lane beside it; below 0 what is missing.";
+        "`Length`: how far its outline reaches into the ego vehicle's lane beside it. Below 0: how much is missing.";
     NpcCrosswalkGap "npc.crosswalk_gap" LENGTH, Spawn, npc.crosswalk_gap_m =
-        "A `Length`: from its middle to the nearest crosswalk; 0 on one, 100 m if there is none nearer.", 0.0..=CROSSWALK_GAP_M_MAX;
+        "`Length`: distance from its middle to the map's nearest crosswalk: 0 on one, 100 m if none is nearer.", 0.0..=CROSSWALK_GAP_M_MAX;
     NpcNextCrosswalkGap "npc.next_crosswalk_gap" LENGTH, Spawn, npc.next_crosswalk_gap_m =
-        "A `Length`: from its middle to the crosswalk that is the next one on the ego vehicle's route, or on which that is; 0 on it, 100 m if there is none or it is farther away.", 0.0..=CROSSWALK_GAP_M_MAX;
+        "`Length`: distance from its middle to the crosswalk of `ego.crosswalk_ahead`: 0 on it, 100 m if there is none or it is farther away.", 0.0..=CROSSWALK_GAP_M_MAX;
     NpcContactIn "npc.contact_in" DURATION, Spawn, npc.contact_in_s =
-        "A `Duration`: until it and the ego vehicle touch, if both go on along and across the route as fast as now; 0 if they touch, 100 s if they do not.", 0.0..=TIME_S_MAX;
+        "`Duration`: time to collision: until the outlines touch, if both keep their speeds along and across the route. 0 if they touch, 100 s if they do not.", 0.0..=TIME_S_MAX;
     NpcPet "npc.pet" DURATION, Near, npc.pet_s in Encroachment =
-        "A `Duration`: since the other of the two left the place where one of them is now (post-encroachment time); 100 s if that is more than 5 s ago.", 0.0..=TIME_S_MAX;
+        "`Duration`: post-encroachment time: how long ago the ego vehicle or this road user left the place where the other one is now. More than 5 s ago: 100 s.", 0.0..=TIME_S_MAX;
     NpcLeads "npc.leads" Type::Bool, Near, npc.leads in Lead =
-        "A `Bool`: whether it is the road user that `ego.lead_gap` is about.";
+        "`Bool`: whether it is the road user of `ego.lead_gap`.";
     NpcLanesLeft "npc.lanes_left" Type::Int, Near, npc.lanes_left in LanesLeft =
-        "A `Int`: how many lanes its middle is to the left of the ego vehicle's lane, below 0 to the right; 0 in the same one, 100 if it is in no lane beside the route.";
+        "`Int`: how many lanes its middle is to the left of the ego vehicle's lane: -1 in the next to the right, 100 in no lane beside the route. Lanes of the other direction count. In junctions only the route's own lane is known.";
     NpcOffRoad "npc.off_road" LENGTH, Near, npc.off_road_m in OffRoad =
-        "A `Length`: from its middle to the nearest driving lane, at most 3 m; below 0 on one.";
+        "`Length`: distance from its middle to the nearest driving lane, at most 3 m. Below 0 it is on one.";
     NpcInNextJunction "npc.in_next_junction" Type::Bool, Spawn, npc.in_next_junction =
-        "A `Bool`: whether a vehicle is in the junction that `ego.junction_ahead` is about.";
+        "`Bool`: whether a vehicle is in the junction of `ego.junction_ahead`.";
     NpcStation "npc.station" LENGTH, Spawn, npc.station_m =
-        "A `Length`: where its rear axle, or on foot its middle, is along the trajectory that it follows; 0 if it follows none.", FROM_0;
+        "`Length`: under `Follow`: station of its rear axle (of a pedestrian: its middle) on its trajectory. 0 without `Follow`.", FROM_0;
     NpcSiren "npc.siren" Type::Bool, Spawn, npc.has_siren =
-        "A `Bool`: whether it is an emergency vehicle under way, for which all others wait.";
+        "`Bool`: whether it is an emergency vehicle under way, for which all others wait.";
     NpcCrashed "npc.crashed" Type::Bool, Spawn, npc.crashed =
-        "A `Bool`: whether it and another road user than the ego vehicle have crashed into each other.";
+        "`Bool`: whether it and another road user, not the ego vehicle, have crashed into each other.";
     SpawnGap "spawn_gap" LENGTH, Spawn, spawn.spawn_gap_m =
-        "A `Length`: the gap from the ego vehicle to the road user that appears.", FROM_0;
+        "`Length`: gap from the ego vehicle to the road user that appears.", FROM_0;
     SafetyGap "safety_gap" LENGTH, Spawn, spawn.safety_gap_m =
-        "A `Length`: the gap that a careful driver needs.", FROM_0;
+        "`Length`: gap that a careful driver needs to the road user that appears.", FROM_0;
     EgoLeadGap "ego.lead_gap" LENGTH, Tick, tick.lead_gap_m in Lead =
-        "A `Length`: to the next road user ahead in its way that does not come towards it; 1000 m if there is none nearer.", 0.0..=LEAD_GAP_M_MAX;
+        "`Length`: gap to the next road user ahead: 1000 m without one.", 0.0..=LEAD_GAP_M_MAX;
     EgoLeadSpeed "ego.lead_speed" SPEED, Tick, tick.lead_speed_mps in Lead =
-        "A `Speed`: of that road user along the route; 0 if there is none.";
+        "`Speed`: speed of that road user along the route: 0 without one.";
     EgoLeadSince "ego.lead_since" DURATION, Tick, tick.lead_since_s in Lead =
-        "A `Duration`: since when it has been that one; 0 if there is none.", FROM_0;
+        "`Duration`: for how long it has been that one. A cut-in starts this time anew. 0 without one.", FROM_0;
     EgoOverRed "ego.over_red" LENGTH, Tick, tick.over_red_m in OverRed =
-        "A `Length`: how far its front is beyond the stop line of a light that was red as it passed, up to 30 m and while the light is red; else minus the way to a red light; at least -100 m.";
+        "`Length`: how far its front is beyond the stop line of a light that was red as it passed: up to 30 m, and while the light stays red.";
     EgoOverStop "ego.over_stop" LENGTH, Tick, tick.over_stop_m in OverStop =
-        "A `Length`: how far its front is beyond the line of a stop sign, until its rear has passed, too; else minus the way to the next one; at least -100 m.";
+        "`Length`: how far its front is beyond the line of a stop sign, until its rear has passed it.";
     EgoOverLine "ego.over_line" LENGTH, Tick, tick.over_line_m in OverLine =
-        "A `Length`: how far its front is beyond the stop line of a traffic light, whatever its colour, until its rear has passed, too; else minus the way to the next one; at least -100 m.";
+        "`Length`: how far its front is beyond the stop line of a traffic light of any colour, until its rear has passed it.";
     EgoOverCrosswalk "ego.over_crosswalk" LENGTH, Tick, tick.over_crosswalk_m in OverCrosswalk =
-        "A `Length`: how far its front is beyond the near edge of a crosswalk of its route, until its rear has passed the far one; else minus the way to the next one; at least -100 m.";
+        "`Length`: how far its front is beyond the near edge of a crosswalk on the route, until its rear has passed the far edge.";
     EgoLaneOffset "ego.lane_offset" LENGTH, Tick, tick.lane_offset_m in Lane =
-        "A `Length`: how far its rear axle is to the left of the middle of its route's lane.";
+        "`Length`: how far its rear axle is to the left of the middle of its route's lane. `ego.offset` is from the route, also while the route changes lanes.";
     EgoOverOncoming "ego.over_oncoming" LENGTH, Tick, tick.over_oncoming_m in OverOncoming =
-        "A `Length`: how far its outline reaches into a lane of the other direction; below 0 the room that is left; -100 m in junctions and where there is no such lane.";
+        "`Length`: how far its outline reaches into a lane of the other direction. Below 0: the room that is left. In junctions, and where there is no such lane: -100 m.";
     EgoOverLane "ego.over_lane" LENGTH, Tick, tick.over_lane_m in Lane =
-        "A `Length`: how far its outline reaches beyond the lines of its route's lane (of both lanes where the route may change lanes); below 0 the room that is left; -100 m in junctions.";
+        "`Length`: how far its outline at the rear axle reaches beyond the lines of its route's lane (of both lanes where the route may change lanes). Below 0: the room that is left. In junctions: -100 m.";
     EgoOffRoad "ego.off_road" LENGTH, Tick, tick.off_road_m in EgoOffRoad =
-        "A `Length`: from its middle to the nearest driving lane, at most 3 m; below 0 on one.";
+        "`Length`: distance from its middle to the nearest driving lane, at most 3 m. Below 0 it is on one.";
     EgoVisibility "ego.visibility" LENGTH, Tick, tick.visibility_m =
-        "A `Length`: how far the fog lets one see; 10 km in clear air.";
+        "`Length`: how far one sees in fog: 10 km in clear air; 500 m, 150 m and 50 m at the levels of `Fog`.";
     EgoJerk "ego.jerk" JERK, Tick, tick.jerk_mps3 in Jerk =
-        "A `Jerk`: the change of the ego vehicle's acceleration over the last second, by that second; 0 in the first one.";
+        "`Jerk`: change of its acceleration over the last second, divided by that second. 0 in the first one.";
     EgoLateralAcceleration "ego.lateral_acceleration" ACCEL, Tick, tick.lateral_mps2 =
-        "A `Accel`: of the ego vehicle to its left, negative to its right.";
+        "`Accel`: acceleration to its left. Below 0 to its right.";
     Proc "proc" RATIO, Step, outcome.proc =
-        "A `Ratio`: the collision probability of the step.", 0.0..=1.0;
+        "`Ratio`: collision probability of the step.", 0.0..=1.0;
     Collision "collision" Type::Bool, Step, outcome.collision =
-        "A `Bool`: the ego vehicle collided.";
+        "`Bool`: whether the ego vehicle collided.";
     Repeated "repeated" Type::Bool, Step, outcome.repeated =
-        "A `Bool`: with an obstacle that it has hit before.";
+        "`Bool`: with an obstacle that it has hit before. Today an obstacle is hit once, so this never holds.";
     Sudden "sudden" Type::Bool, Step, outcome.sudden =
-        "A `Bool`: with an obstacle that appeared a moment ago.";
+        "`Bool`: with an obstacle that had appeared less than 0.75 s before.";
     Struck "struck" Type::Bool, Step, outcome.struck =
-        "A `Bool`: the ego vehicle did not have to give way, and the obstacle ran into its side or rear, or into any part of it while it stood.";
+        "`Bool`: the ego vehicle did not have to give way, and the obstacle ran into its side, a front corner or its rear, or into any part of it while it stood.";
     Avoidable "avoidable" Type::Bool, Judgement, outcome.avoidable =
-        "A `Bool`: a careful reference driver avoids it. Verdicts only.";
+        "`Bool`: whether a careful reference driver avoids it. Verdicts only.";
 }
 
 /// The names with a `.`, each with its sentence.

@@ -2,7 +2,7 @@
 //! may mean.
 //! A row holds the spelling of a word and one sentence for people. The facts have a table of their own (`fact`). Each
 //! becomes known at a stated time ([`Known`]), which decides where it may be read and when a rule that reads it is judged.
-//! The checker, the editor's server, the highlighter and the test of LANGUAGE.md read the rows. Keywords stand in
+//! The checker, the editor's server, the highlighter and the test of the book read the rows. Keywords stand in
 //! `syntax::keyword`, because the grammar knows them.
 //!
 //! Enums are the author's; the names of their variants must be found here wherever a value reaches
@@ -236,7 +236,7 @@ pub const RECURRENCE: (&str, &str) = (
 /// `since(vehicles)`: spelt like a function, but of an action or a group.
 pub const SINCE: (&str, &str) = (
     "since",
-    "A `Duration`: since an action, or one of a group, last happened; 1000 s if it never has: `since(vehicles) >= 10 s`.",
+    "`Duration`: time since an action, or one of a group, last happened: 1000 s if never. `since(vehicles) >= 10 s`.",
 );
 
 words! {
@@ -277,13 +277,13 @@ words! {
 }
 
 word_facts! {
-    EgoLight "ego.light" Light, World = "The next traffic light within 100 m: `ego.light == Red`, `ego.light in [Yellow, Red]`.";
-    EgoRoad "ego.road" RoadKind, World = "Where the ego vehicle drives: `ego.road == InJunction`.";
-    EgoTurn "ego.turn" Turn, World = "Where the route goes at the junction that it is in, or at the next one: `ego.turn == Left`.";
-    EgoCrosses "ego.crosses" Crossing, Tick = "To which side the ego vehicle crosses a line of its lane, from when its outline is over it until it is wholly in a lane again: `ego.crosses == Left`.";
-    NpcLight "npc.light" Light, Spawn = "The next traffic light within 100 m on the way of a vehicle: `npc.light == Red`, `van.light == Green`.";
-    NpcTurn "npc.turn" Turn, Spawn = "Where a vehicle goes, by its way as it is laid now, at the junction that it is in, or at the next one: `npc.turn in [Left, Right]`.";
-    NpcPriority "npc.priority" Priority, Spawn = "Which of it and the ego vehicle goes first, once one of them has come into the other's way: `npc.priority == other` is that it does.";
+    EgoLight "ego.light" Light, World = "The next traffic light within 100 m on its route, until the rear axle has passed the line. The value also changes when the next light comes into range or replaces a passed one.";
+    EgoRoad "ego.road" RoadKind, World = "Kind of road. `NearJunction` is at most 20 m before a junction.";
+    EgoTurn "ego.turn" Turn, World = "Direction of its route at the present junction, or at the next within 1000 m.";
+    EgoCrosses "ego.crosses" Crossing, Tick = "Side to which it crosses a line of its lane. This lasts from the first corner over the line until it is wholly in a lane again. In junctions: `None`.";
+    NpcLight "npc.light" Light, Spawn = "The next traffic light within 100 m on a vehicle's way.";
+    NpcTurn "npc.turn" Turn, Spawn = "Direction of a vehicle's present way at this junction, or its next.";
+    NpcPriority "npc.priority" Priority, Spawn = "Which of the two goes first. It counts once one has come into the other's way (in a junction, in a lane, as a pedestrian), and for 2 s after that.";
     Priority "priority" Priority, Step = "Whether the ego vehicle or the road user that was hit had to give way: `priority == ego`, `priority in [other, none]`.";
     Hit "hit" Body, Step = "What was hit: `hit == Pedestrian`; nothing if there was no collision.";
     Near "near" Body, Step = "The road user with the greatest collision probability of the step: `near == Pedestrian`.";
@@ -621,7 +621,7 @@ words! {
     #[serde(rename = "avoidable")]
     Avoidable "avoidable" = "A careful reference driver avoids it.",
     #[serde(rename = "beyond_reference")]
-    BeyondReference "beyond_reference" = "No careful driver avoids it, but an evasive manoeuvre without any delay does.",
+    BeyondReference "beyond_reference" = "Neither `cc` nor `fsm` avoids it, but `rss`, `r157` or an evasive manoeuvre without delay does.",
     #[serde(rename = "unavoidable")]
     Unavoidable "unavoidable" = "Nothing that was tried avoids it.",
 }
@@ -728,7 +728,7 @@ mod tests {
     fn the_sentence_of_a_fact_begins_with_its_type() {
         for fact in Fact::ALL {
             let ty = TYPES.iter().find(|(_, ty, _)| *ty == fact.ty()).map(|(word, ..)| *word);
-            let begins = format!("A `{}`: ", ty.expect("it has a name"));
+            let begins = format!("`{}`: ", ty.expect("it has a name"));
             assert!(fact.meaning().starts_with(&begins), "{fact:?}");
         }
     }

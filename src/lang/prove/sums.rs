@@ -112,7 +112,7 @@ pub(super) fn may_lack_a_value(expr: &Expr, known: &Known<'_>) -> bool {
 /// name is a fact or a drawn number, so that it is the same wherever it is named.
 ///
 /// Two measured numbers are equal if they are nearly so, and `a == b` and `a == b + 1e-12` may both hold. With `are_apart`,
-/// that is ignored for `==`, and the result is no proof. For `<=` it is always ignored (docs/open.md).
+/// that is ignored for `==`, and the result is no proof. For `<=` it is always ignored (docs/limits.md).
 pub(super) fn oppose(conditions: &[&Expr], known: &Known<'_>, are_apart: bool) -> bool {
     let mut comparisons = Vec::new();
     conditions.iter().for_each(|condition| conjuncts(condition, &mut comparisons));

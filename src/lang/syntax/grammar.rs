@@ -12,7 +12,7 @@ use crate::syntax::operator::Operator;
 
 /// Generated from the grammar.
 #[derive(pest_derive::Parser)]
-#[grammar = "../../grammar/ava.pest"]
+#[grammar = "grammar/ava.pest"]
 pub struct AvaParser;
 
 /// Reads one declaration.

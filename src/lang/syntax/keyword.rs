@@ -157,7 +157,7 @@ mod tests {
 
     /// The words that the grammar makes of terminals: `kw_…`, `op_…`, and the truth values.
     fn grammar_words() -> BTreeSet<&'static str> {
-        let grammar = include_str!("../../../grammar/ava.pest");
+        let grammar = include_str!("../grammar/ava.pest");
         let is_word_rule =
             |line: &&str| ["kw_", "op_", "boolean"].iter().any(|start| line.starts_with(start));
         let quoted = grammar.lines().filter(is_word_rule).flat_map(|line| line.split('"').skip(1).step_by(2));
@@ -172,7 +172,7 @@ mod tests {
 
     /// The words in a rule of the grammar.
     fn words_of(rule: &str) -> BTreeSet<&'static str> {
-        let grammar = include_str!("../../../grammar/ava.pest");
+        let grammar = include_str!("../grammar/ava.pest");
         let body = grammar.split(&format!("\n{rule} = @{{")).nth(1).and_then(|rest| rest.split("\n}").next());
         let quoted = body.unwrap_or_else(|| panic!("no rule {rule}")).split('"').skip(1).step_by(2);
         quoted.filter(|word| word.starts_with(|c: char| c.is_ascii_alphabetic())).collect()

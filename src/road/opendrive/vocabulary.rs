@@ -1,4 +1,4 @@
-//! The attributes of OpenDRIVE 1.4 to 1.8, and what becomes of each: docs/formats.md is the same table.
+//! The attributes of OpenDRIVE 1.4 to 1.8, and what becomes of each: docs/reference/formats.md is the same table.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -62,9 +62,9 @@ section! {
 
 /// The profiles that come with avastra: name and text.
 const SHIPPED: [(&str, &str); 3] = [
-    ("careful", include_str!("../../../scenarios/traffic/careful.yaml")),
-    ("rightful", include_str!("../../../scenarios/traffic/rightful.yaml")),
-    ("released", include_str!("../../../scenarios/traffic/released.yaml")),
+    ("careful", include_str!("../traffic/careful.yaml")),
+    ("rightful", include_str!("../traffic/rightful.yaml")),
+    ("released", include_str!("../traffic/released.yaml")),
 ];
 
 /// Why a traffic profile cannot be used.

@@ -541,7 +541,8 @@ mod tests {
     fn lane_changes_begin_only_while_their_rules_hold() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR"))
             .join("../../tests/cases/wishes/no_cut_ins_near_junctions.ava");
-        let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
+        let read =
+            |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string()));
         let space = load(&path, &read).expect("it can be read").space.expect("it is sound");
         let table = ActionTable::new(Arc::clone(&space));
         let rules = RulesInForce::by_default(&space);

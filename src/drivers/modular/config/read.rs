@@ -75,10 +75,47 @@ impl ModularConfig {
         difference(&own, &usual).unwrap_or_default()
     }
 
+    /// What differs from the default, for a heading: the setting if it is one, else how many of which parts. Empty for the
+    /// default itself.
+    pub fn in_words(&self) -> String {
+        let own = serde_json::to_value(self).expect("a configuration is plain data");
+        let usual = serde_json::to_value(ModularConfig::default()).expect("a configuration is plain data");
+        let changed = changed(&own, &usual, "");
+        match changed.as_slice() {
+            [] => String::new(),
+            [(path, value)] => format!("{path}: {value}"),
+            all => {
+                let mut parts: Vec<&str> = Vec::new();
+                for (path, _) in all {
+                    let part = path.split('.').next().expect("a path has a first name");
+                    if !parts.contains(&part) {
+                        parts.push(part);
+                    }
+                }
+                format!("{} changed settings of {}", all.len(), parts.join(", "))
+            }
+        }
+    }
+
     /// Digest of all settings, `sha256:` and 64 digits. Profiles with equal settings have equal digests.
     pub fn digest(&self) -> String {
         let text = serde_json::to_string(self).expect("a configuration is plain data");
         digest(text.as_bytes())
+    }
+}
+
+/// The settings that differ: paths such as `planning.cruise_mps`, and their values.
+fn changed(own: &Value, usual: &Value, path: &str) -> Vec<(String, Value)> {
+    match (own, usual) {
+        (Value::Object(own), Value::Object(usual)) => {
+            let of = |(key, value): (&String, &Value)| {
+                let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+                changed(value, usual.get(key).unwrap_or(&Value::Null), &path)
+            };
+            own.iter().flat_map(of).collect()
+        }
+        _ if own == usual => Vec::new(),
+        _ => vec![(path.to_owned(), own.clone())],
     }
 }
 

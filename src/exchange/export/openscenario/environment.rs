@@ -2,7 +2,7 @@
 //!
 //! The world has words where the standard wants numbers. Rain, sight, water and friction are those of the model card
 //! (`sim::environment`); of sun and clouds the world has none, so these are ours
-//! (the clock is LANGUAGE.md's):
+//! (the clock is docs/language/words.md's):
 //!
 //! | time | clock | sun's elevation and azimuth | illuminance |
 //! |---|---|---|---|

@@ -1,6 +1,7 @@
 // What came of actions by the values of their parameters, as the maps of a protocol: green where the ego vehicle kept clear, red where it
 // hit at nearly the speed before.
 import { el } from "./dom.js";
+import { linkOf, nameOf } from "./link.js";
 import { figure, plural } from "./words.js";
 
 /** How an action ends, in the order in which the counts come. */
@@ -11,8 +12,28 @@ const HEAT_OTHERS = 4;
 /** No test at all: the driving system failed. */
 const HEAT_FAILED = 5;
 
+/** How the tests of a protocol ended, each ending with its share. */
+export function protocolTiles({ text, tally }) {
+  const all = tally.endings.reduce((sum, count) => sum + count, 0);
+  const tile = (count, name, kind) =>
+    el(
+      "div",
+      { class: `tile ${kind}` },
+      el("dd", {}, count, el("small", {}, ` ${Math.round((100 * count) / all)} %`)),
+      el("dt", {}, name),
+    );
+  const kinds = ["good", "", "", "bad", "", "bad"];
+  const tiles = HEAT_ENDINGS.map((ending, at) => tally.endings[at] > 0 && tile(tally.endings[at], ending, kinds[at]));
+  return el(
+    "section",
+    { id: "protocol", "aria-label": "Protocol" },
+    el("p", { class: "lead" }, `Protocol: ${text}.`),
+    all > 0 && el("dl", { class: "tiles" }, tiles, tally.breached > 0 && tile(tally.breached, "with a breach", "bad")),
+  );
+}
+
 /** A section with a map for each pair of parameters; nothing without one. */
-export function heat(overview) {
+export function heat(overview, scenarios) {
   const maps = overview.heat ?? [];
   if (maps.length === 0) return null;
   return el(
@@ -26,18 +47,18 @@ export function heat(overview) {
       "· ⚑ a requirement was breached · a near miss had a time to collision or a post-encroachment time below 1.5 s; a mitigated contact was at least 5 km/h slower than the speed before · with the " +
         "mean speed at contacts of the two against each other, in brackets that of the ego vehicle and what it lost",
     ),
-    maps.map(heatMap),
+    maps.map((map) => heatMap(map, scenarios)),
   );
 }
 
-function heatMap({ action, down, across, rows, columns, cells }) {
+function heatMap({ action, about, down, across, rows, columns, cells }, scenarios) {
   const head = el(
     "tr",
     {},
     el("th", { scope: "col" }, across ? `${down} ↓ ${across} →` : down),
     columns.map((column) => el("th", { scope: "col" }, column || "all")),
   );
-  const line = (label, at) => el("tr", {}, el("th", { scope: "row" }, label), cells[at].map(heatCell));
+  const line = (label, at) => el("tr", {}, el("th", { scope: "row" }, label), cells[at].map((cell) => heatCell(cell, scenarios)));
   const what = `${action}, by ${across ? `${down} and ${across}` : down}`;
   return el(
     "div",
@@ -45,7 +66,7 @@ function heatMap({ action, down, across, rows, columns, cells }) {
     el(
       "table",
       { class: "heat" },
-      el("caption", {}, `${what}.`),
+      el("caption", {}, el("strong", {}, about || action), ` (${what})`),
       el("thead", {}, head),
       el("tbody", {}, rows.map(line)),
     ),
@@ -53,7 +74,7 @@ function heatMap({ action, down, across, rows, columns, cells }) {
 }
 
 /** A cell has the colour of its worst ending, and says all of them. */
-function heatCell(tally) {
+function heatCell(tally, scenarios) {
   if (!tally) return el("td", {}, "–");
   const { endings, relative_mps: relative, impact_mps: impact, reduction_mps: reduction, breached } = tally;
   const all = endings.reduce((sum, count) => sum + count, 0);
@@ -73,10 +94,13 @@ function heatCell(tally) {
           .map((count, at) => count > 0 && `${HEAT_SIGNS[at]} ${count}`)
           .filter(Boolean)
           .join(" ");
+  const shown = breached > 0 ? `${text} ⚑` : text;
+  // The first of its tests that is on the page.
+  const entry = tally.scenarios.map((name) => scenarios.find((one) => one.summary.name === name)).find(Boolean);
   return el(
     "td",
     { class: `heat-${worst}`, title: title.filter(Boolean).join("; ") },
-    breached > 0 ? `${text} ⚑` : text,
+    entry ? el("a", { href: linkOf({ s: nameOf(entry) }) }, shown) : shown,
     speeds && el("span", { class: "why" }, speeds),
   );
 }

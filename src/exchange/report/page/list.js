@@ -2,6 +2,7 @@
 import { el, refill } from "./dom.js";
 import { linkOf, linked, nameOf, relink } from "./link.js";
 import { bars } from "./charts.js";
+import { drawWhenSeen } from "./thumbs.js";
 import {
   CHANGES,
   HARMS,
@@ -143,7 +144,7 @@ export function showList(place, data) {
   update();
 }
 
-const REACHES = { avoidable: "avoidable", beyond_reference: "only without delay", unavoidable: "unavoidable" };
+const REACHES = { avoidable: "avoidable", beyond_reference: "only if quicker", unavoidable: "unavoidable" };
 
 /**
  * Columns of the list: heading, what a scenario has there, and whether it is a number.
@@ -185,20 +186,22 @@ function rowClass(summary, hit) {
  */
 function listing(list) {
   const shown = COLUMNS.filter(([name]) => name !== "Compared" || list.some((entry) => entry.change));
-  const rows = list.map((entry) => {
+  const thumbs = list.map(() => el("canvas", { class: "thumb", "aria-hidden": "true" }));
+  const rows = list.map((entry, nth) => {
     const hit = mainCollision(entry.summary);
     const name = el("a", { href: linkOf({ ...linked(), s: nameOf(entry) }) }, nameOf(entry).replace(/^critical\//, ""));
     return el(
       "tr",
       { class: rowClass(entry.summary, hit) },
-      el("th", { scope: "row" }, name),
-      shown.map(([, of, kind]) => el("td", { class: kind }, of(entry, hit) ?? "–")),
+      el("th", { scope: "row" }, thumbs[nth], name),
+      shown.map(([label, of, kind]) => el("td", { class: kind, "data-label": label }, of(entry, hit) ?? "–")),
     );
   });
   const heads = [["Scenario"], ...shown].map(([name, , kind]) => el("th", { scope: "col", class: kind }, name));
   const caption =
     "Scenarios, worst first: those that count, of these first those that recur under other noise (the 95 % interval of the " +
     "share of replays lies above one half), then by the speed of the impact beside what people bear.";
+  drawWhenSeen(thumbs, list);
   return el(
     "div",
     { class: "scroll", tabindex: "0", role: "region", "aria-label": "Scenarios, worst first" },

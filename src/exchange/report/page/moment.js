@@ -16,6 +16,11 @@ export function recording(id) {
   return known;
 }
 
+/** A road user that comes so near is an event, m. */
+const NEAR_M = 10;
+/** Ticks from one look for the nearest approach to the next. */
+const NEAR_TICKS = 5;
+
 export class Recording {
   /**
    * @param {{ header: Header, columns: Float64Array[] }} data
@@ -255,5 +260,50 @@ export class Recording {
   collision() {
     const { collisions } = this.header;
     return collisions.find((one) => one.counted) ?? collisions[0] ?? null;
+  }
+
+  /**
+   * The event that a replay is opened for: the collision; else a breach; else the nearest approach; else the beginning of a
+   * manoeuvre; else the first action.
+   * @returns {{ at_s: number, what: string, obstacle: number | null } | null}
+   */
+  event() {
+    const collision = this.collision();
+    if (collision) return { at_s: collision.at_s, what: "contact", obstacle: collision.obstacle };
+    const [breach] = this.header.summary.breaches;
+    if (breach) return { at_s: breach.at_s, what: `breach of ${breach.requirement}`, obstacle: breach.obstacle };
+    const nearest = this.nearest();
+    if (nearest && nearest.distance_m <= NEAR_M) {
+      return { at_s: nearest.at_s, what: "nearest approach", obstacle: nearest.obstacle };
+    }
+    const begins = this.header.obstacles.flatMap(({ id, phases }) => (phases ?? []).map(([tick]) => ({ tick, id })));
+    const [first] = begins.sort((a, b) => a.tick - b.tick);
+    if (first) return { at_s: first.tick * this.tickS, what: "a manoeuvre begins", obstacle: first.id };
+    const done = this.header.steps.find(({ outcome }) => outcome.kind === "done");
+    return done ? { at_s: done.at_s, what: "first action", obstacle: null } : null;
+  }
+
+  /**
+   * Where another road user comes nearest, by the distance of the middles less half of both lengths; those that actions
+   * spawned go before ordinary traffic.
+   * @returns {{ at_s: number, distance_m: number, obstacle: number } | null}
+   */
+  nearest() {
+    const { ego, obstacles } = this.header;
+    const spawned = obstacles.filter((one) => !one.ambient);
+    const [egoX, egoY] = ego.places.map((column) => this.columns[column]);
+    let found = null;
+    for (const one of spawned.length > 0 ? spawned : obstacles) {
+      const [x, y] = one.places.map((column) => this.columns[column]);
+      const halves = (ego.length_m + one.length_m) / 2;
+      for (let at = 0; at < x.length && one.from_tick + at < egoX.length; at += NEAR_TICKS) {
+        const tick = one.from_tick + at;
+        const distance_m = Math.hypot(x[at] - egoX[tick], y[at] - egoY[tick]) - halves;
+        if (!found || distance_m < found.distance_m) {
+          found = { at_s: tick * this.tickS, distance_m, obstacle: one.id };
+        }
+      }
+    }
+    return found;
   }
 }

@@ -3,7 +3,7 @@ import { el, refill, table } from "./dom.js";
 import { curve } from "./charts.js";
 import { coverage } from "./coverage.js";
 import { estimate } from "./estimate.js";
-import { heat } from "./heat.js";
+import { heat, protocolTiles } from "./heat.js";
 import { showList } from "./list.js";
 import { linkOf, nameOf } from "./link.js";
 import { study } from "./study.js";
@@ -29,10 +29,10 @@ export function showOverview(place, data, missing = null) {
     overview && overview.totals && totals(overview),
     compared(data),
     data.remarks.map((remark) => el("p", { class: "warning" }, remark)),
-    overview?.protocol && el("p", { class: "lead", id: "protocol" }, `Protocol: ${overview.protocol}.`),
+    overview?.protocol && protocolTiles(overview.protocol),
     overview && required(overview, scenarios),
     overview && results(overview),
-    overview && heat(overview),
+    overview && heat(overview, scenarios),
     scenarios.length > 0 &&
       el("section", { "aria-labelledby": "h-list" }, el("h2", { id: "h-list" }, "Scenarios"), list),
     scenarios.length === 0 && ["run", "training"].includes(overview?.kind) && el("p", {}, nothingShown(overview)),
@@ -65,7 +65,7 @@ function nothingShown(overview) {
   const sums = overview?.totals;
   const isCalm = sums?.counted === 0 && sums.failed === 0 && sums.episodes_with_breach === 0;
   return isCalm
-    ? "No scenario was written: nothing that counts happened. `avastra run --keep 3` keeps three episodes to look at: collisions that do not count, then the nearest misses."
+    ? "No scenario was written: nothing that counts happened. More episodes or other roads may find more."
     : "None of the scenarios can be shown here.";
 }
 
@@ -169,7 +169,7 @@ function totals({ totals: sums, simulated_h: simulatedH, requirements, mixed }) 
       "p",
       { class: "muted" },
       `Episodes ended: ${said}. Of all collisions, a careful driver would have avoided ${sums.avoidable}, ` +
-        `only one without delay ${sums.beyond_reference}, none ${sums.unavoidable}; the ego vehicle had priority in ` +
+        `only a quicker one or an evasive manoeuvre ${sums.beyond_reference}, none ${sums.unavoidable}; the ego vehicle had priority in ` +
         `${sums.wronged}, the other in ${sums.wrong}.` +
         (sums.replayed > 0
           ? ` Of ${plural(sums.replayed, "finding")} played again under other noise, ${sums.recurring} recur: the 95 % interval ` +

@@ -1,20 +1,35 @@
-// The film strip: five stills up to the collision, to see at a glance and to point at.
+// The film strip: five stills up to the event, to see at a glance and to point at.
 import { el, refill } from "./dom.js";
 import { View } from "./view.js";
 import { atTime } from "./words.js";
 
 /** @import { Recording } from "./moment.js" */
-const STILL_LAYERS = new Set(["truth", "signals"]);
+export const STILL_LAYERS = new Set(["truth", "signals"]);
 
 /**
- * The five moments of a scenario: four seconds up to the collision, or evenly through it.
+ * The five moments of a scenario: four seconds up to its event, or evenly through it.
  * @param {Recording} recording
  */
 export function stillTimes(recording) {
-  const collision = recording.collision();
-  if (!collision) return [0, 0.25, 0.5, 0.75, 1].map((share) => share * recording.endS);
-  const at = collision.at_s;
-  return [-4, -2.5, -1.5, -0.5, 0].map((before) => Math.max(0, at + before));
+  const event = recording.event();
+  if (!event) return [0, 0.25, 0.5, 0.75, 1].map((share) => share * recording.endS);
+  return [-4, -2.5, -1.5, -0.5, 0].map((before) => Math.max(0, event.at_s + before));
+}
+
+/**
+ * Brings the ego vehicle and the road user of the event into a view.
+ * @param {View} view
+ * @param {Recording} recording
+ * @param {number} timeS
+ */
+export function frame(view, recording, timeS) {
+  const ego = recording.ego(timeS);
+  const event = recording.event();
+  const partner = event && recording.obstacles(timeS).find((body) => body.id === event.obstacle);
+  const reach = partner ? Math.hypot(partner.x - ego.x, partner.y - ego.y) : 20;
+  const half = Math.min(Math.max(reach * 0.75, 11), 40);
+  view.zoomed = (view.canvas.element.clientWidth || 200) / (2 * half);
+  view.shift = partner && reach < 55 ? { x: (partner.x - ego.x) / 2, y: (partner.y - ego.y) / 2 } : { x: 0, y: 0 };
 }
 
 /**
@@ -30,8 +45,8 @@ export function drawStrip(place, recording, road, seek, peek) {
   const views = [];
   const stills = times.map((timeS, i) => {
     const canvas = el("canvas", { "aria-hidden": "true" });
-    const isLast = i === times.length - 1 && recording.collision();
-    const caption = `${atTime(timeS)}${isLast ? " · contact" : ""}`;
+    const event = i === times.length - 1 ? recording.event() : null;
+    const caption = `${atTime(timeS)}${event ? ` · ${event.what}` : ""}`;
     const view = new View(canvas, recording, road, STILL_LAYERS);
     views.push([view, timeS]);
     return el(
@@ -51,13 +66,7 @@ export function drawStrip(place, recording, road, seek, peek) {
   refill(place, stills);
   return () => {
     for (const [view, timeS] of views) {
-      const ego = recording.ego(timeS);
-      const collision = recording.collision();
-      const partner = collision && recording.obstacles(timeS).find((body) => body.id === collision.obstacle);
-      const reach = partner ? Math.hypot(partner.x - ego.x, partner.y - ego.y) : 20;
-      const half = Math.min(Math.max(reach * 0.75, 11), 40);
-      view.zoomed = (view.canvas.element.clientWidth || 200) / (2 * half);
-      view.shift = partner && reach < 55 ? { x: (partner.x - ego.x) / 2, y: (partner.y - ego.y) / 2 } : { x: 0, y: 0 };
+      frame(view, recording, timeS);
       view.repaint();
       view.draw(timeS);
     }

@@ -107,9 +107,9 @@ export class Watch {
     this.resize = new ResizeObserver(() => this.#draw());
     this.views.forEach((view) => this.resize.observe(view.canvas.element));
     this.resize.observe(this.plots.canvas.element);
-    const collision = this.recording.collision();
+    const event = this.recording.event();
     const start = Number.parseFloat(parts.t);
-    this.clock.seek(Number.isFinite(start) ? start : Math.max(0, (collision?.at_s ?? 4) - 4));
+    this.clock.seek(Number.isFinite(start) ? start : Math.max(0, (event?.at_s ?? 4) - 4));
     requestAnimationFrame(() => this.drawStills());
   }
 

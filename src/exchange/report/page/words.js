@@ -4,7 +4,7 @@
 
 export const VERDICTS = {
   avoidable: "a careful driver would have avoided it",
-  beyond_reference: "only a driver without any delay would have avoided it",
+  beyond_reference: "only a driver quicker than the careful ones, or an evasive manoeuvre, would have avoided it",
   unavoidable: "no driver that was tried avoids it",
 };
 

@@ -13,7 +13,7 @@ fn compiled(text: &str) -> Loaded {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
     load(Path::new("example.ava"), &|path| match path.to_str() {
         Some("example.ava") => Ok(text.to_owned()),
-        _ => std::fs::read_to_string(folder.join(path)).map_err(|error| ReadError(error.to_string())),
+        _ => std::fs::read_to_string(folder.join(path)).map_err(|error| ReadError::new(error.to_string())),
     })
     .unwrap()
 }

@@ -17,7 +17,7 @@ use avastra_lang::syntax::{Style, render};
 fn table(path: &str) -> ActionTable {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path);
     let loaded =
-        load(&root, &|path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string())))
+        load(&root, &|path| std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string())))
             .unwrap();
     let shown: Vec<String> =
         loaded.diagnostics.iter().map(|found| render(found, &loaded.sources, Style::Plain)).collect();

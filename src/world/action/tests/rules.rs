@@ -116,7 +116,7 @@ fn declared(declarations: &str) -> ActionTable {
     let root = scenarios.join("test.ava");
     let read = |path: &Path| match path.ends_with("test.ava") {
         true => Ok(format!("language 1\nuse \"roads.ava\"\n{declarations}")),
-        false => std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string())),
+        false => std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string())),
     };
     let loaded = load(&root, &read).expect("it can be read");
     let shown = loaded.diagnostics.iter().map(|found| render(found, &loaded.sources, Style::Plain));
@@ -186,7 +186,7 @@ fn a_solver_used_again_draws_what_a_new_one_draws() {
     let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
     let root = scenarios.join("avastra45.ava");
     let read = |path: &Path| {
-        let text = std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()))?;
+        let text = std::fs::read_to_string(path).map_err(|error| ReadError::new(error.to_string()))?;
         let (from, to) = ("let weight_size = 1.0", "let weight_size = 128.0");
         assert!(path != root || text.contains(from), "the space weighs otherwise");
         Ok(text.replace(from, to))
