@@ -10,22 +10,22 @@ binary=${AVASTRA:-$root/target/release/avastra}
 cd "$root"
 # One picture a line: its scenario, and the moments of its panels in s.
 while read -r name moments; do
-  "$binary" render "docs/pictures/$name.ava" --at "$moments" --out "docs/pictures/$name.svg"
+  "$binary" render "docs/pictures/$name.ava" --at "$moments" --out "docs/pictures/$name.svg" < /dev/null
 done <<END
 drive_behind 0.02,6
 overtake 0.02,4
-drive_opposite 0.02,3
-cross_road 3.5,6
-walk 0.02,2
-walk_along 0.02,3
+drive_opposite 0.02
+cross_road 5.7
+walk 2.5
+walk_along 0.02
 stand 0.02
-follow 0.02,2,4
+follow 0.02,2.4,4.2
 places 2.02
 lane_offset 0.02
-from_behind 0.02,2
-early 3.5,6
-cut_in 0.5,2
-left_turn 4,6
-from_the_right 4,6
-crosswalk 10,12
+from_behind 1,2.8
+early 4.78,6.78
+cut_in 0.5,2.4
+left_turn 6,7.94
+from_the_right 5.5,7.12
+crosswalk 11.5,13.42
 END

@@ -21,10 +21,11 @@ import json
 import os
 import platform
 import re
-import shutil
 import subprocess
 import sys
 from typing import Any, Callable, Deque, Dict, Iterable, List, NoReturn, Optional, Sequence, Tuple
+
+from .program import found as where
 
 COMMANDS = ("run", "study", "estimate")
 #: How often Ray plays a shard again whose worker or program was killed.
@@ -80,7 +81,7 @@ def play(number: int, shards: int, work: Work) -> Tuple[int, str]:
     for folder in (work["working_directory"], work["folder"]):
         if not os.path.isdir(folder):
             return 1, f"there is no folder `{folder}` on node {node}: all nodes must see the same files"
-    if shutil.which(work["program"]) is None:
+    if where(work["program"]) is None:
         return 1, f"there is no program `{work['program']}` on node {node}"
     out = os.path.join(work["folder"], str(number))
     command = [work["program"], work["command"]]
@@ -151,7 +152,7 @@ def _number(text: str) -> int:
 
 
 def _program(program: str) -> str:
-    found = shutil.which(program)
+    found = where(program)
     if found is None:
         raise Refused(f"there is no program `{program}`: `cargo install --locked --path .` in avastra's repository installs it, or name it "
                       "with `--program` or AVASTRA")

@@ -109,10 +109,10 @@ fn highlight() -> String {
     let built_in = [engine_words(), facts()].concat();
     let keywords = json!({
         "$pattern": r"[A-Za-z_][A-Za-z0-9_.]*",
-        "keyword": keyword,
-        "literal": names(keyword::LITERALS),
-        "type": names(&words::types()),
-        "built_in": built_in,
+        "keyword": keyword.join(" "),
+        "literal": names(keyword::LITERALS).join(" "),
+        "type": names(&words::types()).join(" "),
+        "built_in": built_in.join(" "),
     });
     format!(
         "// The colours of avastra's files, written by `avastra editor-files`.\n\

@@ -29,6 +29,8 @@ pub enum Failure {
     Breach { episodes: usize },
     #[error("{count} recur under other noise", count = super::output::plural(*findings, "finding"))]
     Recurring { findings: usize },
+    #[error("the ego vehicle got stuck in {count}", count = super::output::plural(*episodes, "episode"))]
+    Stalled { episodes: usize },
     /// The external driving system is not the one that the campaign was begun with.
     #[error("{message}")]
     OtherProgram { message: String },
@@ -79,6 +81,7 @@ impl Failure {
             Failure::Collision { .. }
             | Failure::Breach { .. }
             | Failure::Recurring { .. }
+            | Failure::Stalled { .. }
             | Failure::Failing { .. } => 4,
             Failure::Ads { .. } | Failure::Unreached { .. } => 5,
             // A shell reports this status for a process that SIGINT ended.

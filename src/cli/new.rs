@@ -152,6 +152,7 @@ fn on_map(output: &Output, path: &Path) -> Result<Vec<(String, String)>, Failure
     let text = load::text(path)?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let map = RoadMap::from_opendrive(&stem, &text).map_err(|error| Failure::file("read", path, error))?;
+    map.warnings.iter().for_each(|warning| output.warn(&in_comment(warning)));
     let proposals = propose(&map, ROUTES_MAX);
     if proposals.is_empty() {
         let message = "no way on it can be driven; `avastra road` tells what it holds";

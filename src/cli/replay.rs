@@ -222,7 +222,10 @@ fn play(
             let crashes = crashes.into_iter().map(|crash| format!("  {crash}"));
             let failure =
                 log.failure.as_ref().map(|failure| format!("  it ends with {}", failure.in_words()));
-            lines.chain(crashes).chain(failure).collect::<Vec<_>>().join("\n")
+            // Where nothing is claimed, nothing else says what became of the episode.
+            let is_bare = scenario.claims.is_empty();
+            let end = is_bare.then(|| format!("  ended: {}", log.end.name()));
+            lines.chain(crashes).chain(failure).chain(end).collect::<Vec<_>>().join("\n")
         }
     };
     let crashes: Vec<_> = log.incidents.iter().map(|crash| {
@@ -267,7 +270,7 @@ fn severity_text(
     severity: &oracle::Severity,
 ) -> String {
     let held = log.held_at(collision.contact.time_s);
-    let held = held.map_or_else(String::new, |held| format!("; its speed was held by: {}", held.text()));
+    let held = held.map_or_else(String::new, |held| format!("; its speed was limited by: {}", held.text()));
     format!(
         "  {} npc#{} ({}) hit at {:.2} s by the ego vehicle's {}: closing at {:.1} m/s, delta-v {:.1} m/s, the other's {:.1} m/s; {}{held}",
         space.body_name(collision.body),

@@ -125,6 +125,9 @@ fn failed_on(found: &Totals, fail_on: &[FailOn]) -> Result<(), Failure> {
     if fail_on.contains(&FailOn::Recurring) && found.recurring > 0 {
         return Err(Failure::Recurring { findings: found.recurring as usize });
     }
+    if fail_on.contains(&FailOn::Stalled) && found.stalled > 0 {
+        return Err(Failure::Stalled { episodes: found.stalled as usize });
+    }
     // If no episode was driven to its end, nothing was tested, so the command fails without `--fail-on`, too.
     if found.failed > 0 && (!fail_on.is_empty() || found.failed == found.episodes) {
         return Err(Failure::Ads { findings: found.failed as usize });
@@ -185,6 +188,13 @@ fn play_all(
     output.say(&totals_text(&totals, started.elapsed().as_secs_f64(), todo.len(), is_mixed));
     if !refusals.is_empty() {
         output.say(&refusals_text(&refusals));
+    }
+    if totals.stalled * 2 > totals.episodes {
+        output.warn(&format!(
+            "the ego vehicle got stuck in {} of {}: what does not drive avoids every collision",
+            totals.stalled,
+            plural(totals.episodes as usize, "episode")
+        ));
     }
     let groups = directory.read(Database::groups)?;
     let found = directory.read(Database::found)?;
@@ -502,7 +512,7 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize, is_mixed: bool) -
     }
     if totals.replayed > 0 {
         text.push_str(&format!(
-            "\n{} of {} {} under other noise (their 95 % interval lies above one half)",
+            "\n{} of {} {} under other noise (a finding does if its 95 % interval lies above one half)",
             totals.recurring,
             plural(totals.replayed as usize, "finding"),
             if totals.replayed == 1 { "recurs" } else { "recur" }

@@ -217,6 +217,18 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
         totals.counted,
         plural(totals.episodes_with_counted as usize, "episode"),
     ));
+    let learned = directory.read(Database::learned)?;
+    if let Some((epsilon, updates)) = learned.filter(|_| kept.is_some()) {
+        output.say(&format!(
+            "{updates} updates of the network; at the end it chose at random in {:.0} % of the steps",
+            100.0 * epsilon
+        ));
+        if updates == 0 {
+            output.warn(
+                "the network was never updated, so what it chooses is chance: train for more episodes, or lower `learning_starts`",
+            );
+        }
+    }
     output.say(&format!(
         "what it learned, on {} of its own: {} counted in {}",
         plural(played(settings, &evaluation), "episode"),

@@ -241,7 +241,7 @@ impl fmt::Display for Reason {
             Reason::Degraded => write!(f, "degraded mode"),
             Reason::Emergency(id) => write!(f, "emergency {}", named(*id)),
             Reason::Contact => write!(f, "stop after a contact"),
-            Reason::Reported => write!(f, "external"),
+            Reason::Reported => write!(f, "its own program, which gave no reason"),
         }
     }
 }

@@ -120,7 +120,10 @@ fn a_name_says_what_the_checker_knows_of_it() {
     let text = told("state mine: Le‸vel = None").expect("it is a name");
     assert!(text.contains("enum Level = None < Light < High") && text.contains("How thick it is."), "{text}");
     assert!(told("let farther = fa‸r * 2").is_some_and(|text| text.contains("let far = 50 m")));
-    assert!(told("rule r on lift: ego.spe‸ed <= 3 m/s").is_some_and(|text| text.contains("how fast")));
+    assert!(
+        told("rule r on lift: ego.spe‸ed <= 3 m/s")
+            .is_some_and(|text| text.contains("speed of the ego vehicle"))
+    );
     assert_eq!(told("let farther = far * 2 ‸"), None);
 }
 

@@ -336,7 +336,7 @@ fn profiles_of_speeds_keep_their_times() {
         // The least rate is 0.1 m/s²: 0.5 m/s take 5 s of the 20 s.
         (dip, r#"speed="7.5" time="20""#, "{ speed: 7.5 m/s, rate: 0.1 m/s^2 }\n  after 15 s {"),
         (dip, r#"speed="0" time="4""#, "{ speed: 0 m/s, rate: 2 m/s^2 }\n  { speed: 2 m/s, rate: 2 m/s^2 }"),
-        (dip, r#"speed="-1" time="4""#, "nobody drives backwards"),
+        (dip, r#"speed="-1" time="4""#, "no road user drives backwards"),
         (dip, r#"speed="$dip_mps""#, "without a `time`"),
         (dip, r#"speed="$dip_mps" time="-1""#, "less than 0"),
         // What follows waits for the end of the last entry, or is refused.
@@ -517,7 +517,7 @@ fn conditions_and_words_are_read_or_refused() {
         (
             "dynamicsShape=\"sinusoidal\" value=\"3\" dynamicsDimension=\"time\"",
             "dynamicsShape=\"step\" value=\"0\" dynamicsDimension=\"rate\"",
-            "nobody moves aside faster than 10 m/s",
+            "no road user moves sideways faster than 10 m/s",
         ),
         (
             "value=\"3\" dynamicsDimension",

@@ -343,7 +343,8 @@ fn attacked(fixture: &Path, number: usize, attack: &Attack) {
     let mut arguments: Vec<String> = Vec::new();
     for word in attack.command {
         match *word {
-            "QUICK" => arguments.extend(["--ads", "cc", "--road", "corner", "--episodes"].map(str::to_owned)),
+            "QUICK" => arguments
+                .extend(["--keep", "0", "--ads", "cc", "--road", "corner", "--episodes"].map(str::to_owned)),
             "SPACE" => arguments.push(shipped("scenarios/avastra45.ava")),
             "POLICY" => arguments.push(shipped("policies/corner.ava")),
             "XOSC" => arguments.push(shipped("tests/cases/imports/cut_in.xosc")),

@@ -63,6 +63,26 @@ fn each_row_is_played_once_whoever_plays_it() {
     assert_eq!(read(&twice, "protocol.csv").lines().count(), 25);
 }
 
+/// A protocol of a driving system that fails ends in good order, with a page.
+#[test]
+fn a_protocol_outlives_its_driving_system() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let space = space(scratch.path());
+    for how in ["nan", "crash-in-episode", "error", "close-stdout"] {
+        let out = scratch.path().join(how).display().to_string();
+        let toy =
+            format!("'{}' ads toy --misbehave {how}", assert_cmd::cargo::cargo_bin("avastra").display());
+        let run = ["run", &space, "--agent", "every-row", "--replays", "0", "--ads", &toy, "--out", &out];
+        let (status, stdout, stderr) = outcome(&mut avastra(&run));
+        assert!(status == 0 || status == 5, "{how}: {status} {stderr}");
+        assert!(stdout.contains("driving system failed"), "{how}: {stdout}");
+        done(&["report", &out]);
+        let page = read(Path::new(&out), "report.html");
+        let told = page.split(r#""text":""#).nth(1).and_then(|rest| rest.split('"').next());
+        assert!(told.is_some_and(|told| told.contains("driving system failed")), "{how}: {told:?}");
+    }
+}
+
 #[test]
 fn a_page_has_heat_maps_by_parameters() {
     let scratch = tempfile::tempdir().expect("a scratch directory");

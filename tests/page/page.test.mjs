@@ -350,7 +350,7 @@ test("the list is what the link asks for", () => {
   assert.deepEqual(files("#verdict=avoidable"), ["critical/one"]);
   assert.deepEqual(files("#q=STALLED"), ["critical/three"]);
   assert.deepEqual(all.map(kindOf), [
-    "12 pedestrian, planning", "12 pedestrian, planning", "breach of gap", "ended: stalled",
+    "12 pedestrian, planning", "12 pedestrian, planning", "breach of gap", "nothing found, kept to look at",
   ]);
   assert.deepEqual(files(linkOf({ group: "breach of gap" })), ["critical/two"]);
 });

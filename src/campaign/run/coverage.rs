@@ -56,6 +56,17 @@ impl Database {
         })
     }
 
+    /// The share of random choices in the last episode of a training, and the updates of all; `None` without any episode.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn learned(&self) -> Result<Option<(f64, i64)>, DatabaseError> {
+        let query =
+            "SELECT (SELECT epsilon FROM learning ORDER BY episode DESC LIMIT 1), sum(updates) FROM learning
+                     HAVING count(*) > 0";
+        Ok(query_all(&self.connection, query, |row| Ok((row.get(0)?, row.get(1)?)))?.into_iter().next())
+    }
+
     /// The episodes of a training; none for a run.
     ///
     /// # Errors

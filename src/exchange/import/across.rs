@@ -250,7 +250,7 @@ pub fn aside_fields(
         }
     };
     if aside_mps > ASIDE_MPS_MAX || matches!(dynamics.over, Over::AtOnce) {
-        source.note(format!("nobody moves aside faster than {ASIDE_MPS_MAX} m/s"));
+        source.note(format!("no road user moves sideways faster than {ASIDE_MPS_MAX} m/s"));
     }
     if told.mps.is_none_or(|mps| aside_mps > SLOW_PART * mps) {
         source.note("who moves aside, or brakes while it does, keeps its speed along its way, and is up to a metre or two ahead");

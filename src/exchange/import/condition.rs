@@ -287,7 +287,8 @@ impl Waiting<'_, '_> {
 
     /// That the lanes beside an entity are free.
     fn clear(&self, source: &mut Source, mark: &Mark, room: &Clearance) -> Option<Said> {
-        let reason = "room beside somebody is read of one that drives the ego vehicle's way";
+        let reason =
+            "the room beside a road user is read only of a road user that drives the ego vehicle's way";
         let is_along = self.cast.looks_ahead(source, mark, &room.of)?;
         source.refuse_if(!is_along || self.cast.is_ego(&room.of), mark, reason)?;
         let beside = self.beside(source, mark, room)?;

@@ -115,7 +115,7 @@ impl<'a> Cast<'a> {
         };
         moving.entity.body.drives(source, mark, begins_mps)?;
         if let Some(mps) = mps {
-            source.refuse_if(mps < 0.0, mark, "nobody drives backwards")?;
+            source.refuse_if(mps < 0.0, mark, "no road user drives backwards")?;
             source.refuse_if(mps > *SPAWN_SPEED_MPS.end(), mark, too_fast(mps))?;
         }
         if matches!(dynamics.over, Over::Never) {
@@ -373,7 +373,7 @@ pub fn profile(
 ) -> Option<(Vec<Said>, Said)> {
     let (mut from, mut begins, mut phases) = (from_mps, begins, Vec::new());
     for SpeedEntry { mps, time_s } in entries {
-        source.refuse_if(*mps < 0.0, mark, "nobody drives backwards")?;
+        source.refuse_if(*mps < 0.0, mark, "no road user drives backwards")?;
         source.refuse_if(*mps > *SPAWN_SPEED_MPS.end(), mark, too_fast(*mps))?;
         let mut said = begins.and("{ speed: ").number(*mps, "m/s");
         let mut rest_s = *time_s;

@@ -354,7 +354,7 @@ impl<'a> Cast<'a> {
             // It may be tilted there, which is not taken over.
             ActKind::Placed(position) if position.is_own_place(&moving.entity.name) => Some(()),
             ActKind::Placed(_) | ActKind::Ahead(..) => {
-                source.refuse(mark, "nobody is placed anew in the story")
+                source.refuse(mark, "a road user cannot be moved to another place during the story")
             }
             ActKind::Keep(kept) => {
                 let said = self.kept(source, moving, mark, kept)?;
@@ -448,7 +448,7 @@ fn go_together(source: &mut Source, acts: &[&Act], told: &Told) -> Option<()> {
     }
     let Some(act) = acts.iter().find(|act| is_aside(act)) else { return Some(()) };
     let stands = told.mps == Some(0.0) && !acts.iter().any(|act| is_speed(act));
-    source.refuse_if(stands, &act.mark, "it stands, and nobody slides aside here")
+    source.refuse_if(stands, &act.mark, "it stands, and a standing road user cannot slide sideways here")
 }
 
 /// Whether two wait for the same.

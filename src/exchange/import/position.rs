@@ -233,7 +233,7 @@ fn heading(source: &mut Source, place: Node) -> Option<Heading> {
     let heading_rad = source.left_or_0(orientation, "h")?;
     for tilt in ["p", "r"] {
         if source.number_or(orientation, tilt, 0.0)? != 0.0 {
-            source.note("nobody is tilted: pitch and roll are not taken over");
+            source.note("pitch and roll are not taken over");
         }
     }
     let is_relative = match source.word(orientation, "type", &["relative", "absolute"])? {

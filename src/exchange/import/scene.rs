@@ -133,7 +133,7 @@ impl Scene {
             });
         }
         if !others.is_empty() {
-            source.note("others follow their ways exactly, as the file's player moves them, and mind nobody");
+            source.note("other road users follow their ways exactly, as the file's player moves them, and react to nothing");
         }
         let (start, goal) = (lane_point(&cast.map, start), lane_point(&cast.map, goal));
         let lanes = || cast.route.lanes.iter().map(|part| cast.map.lane(part.lane));

@@ -410,7 +410,7 @@ impl Cast {
                 actions.iter().partition(|action| action.has_tag_name("PrivateAction"));
             if own.is_empty() {
                 if scope.names.is_empty() && !private.is_empty() {
-                    source.refuse::<()>(event, "nobody is named who acts");
+                    source.refuse::<()>(event, "no road user is named that acts");
                 }
                 self.ego_actions += private.len();
             }
@@ -486,7 +486,8 @@ impl Cast {
                 _ => false,
             };
             if matches!(condition.kind, When::Contact(_)) && is_over {
-                source.note("what the file lets somebody do after a contact is not played: a contact ends what both do");
+                source
+                    .note("what a road user does after a contact is not played: a contact ends what both do");
             }
             if is_over {
                 condition.kind = When::Never;
@@ -522,7 +523,7 @@ impl Cast {
         }
         let Some(name) = source.text(inner, "entityRef") else { return };
         if !when.is_some_and(is_at_once) {
-            source.refuse::<()>(inner, "nobody leaves during the story");
+            source.refuse::<()>(inner, "no road user leaves during the story");
         } else if self.knows(source, inner, &name) {
             self.gone.insert(name);
         }

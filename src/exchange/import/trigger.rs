@@ -29,7 +29,8 @@ const STATES: [&str; 7] = [
     "completeState",
 ];
 
-const OUTLINE: &str = "the way of somebody's outline to a place is not read: `freespace=\"false\"` is";
+const OUTLINE: &str =
+    "the distance from a road user's outline to a place is not read: `freespace=\"false\"` is";
 
 const ROUTING: [&str; 5] = ["assignedRoute", "fastest", "leastIntersections", "shortest", "undefined"];
 

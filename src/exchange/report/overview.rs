@@ -81,6 +81,11 @@ struct Told {
     traffic: Option<TrafficRecord>,
     #[serde(default)]
     ambient: u32,
+    /// Rules and requirements that are switched off, and optional ones that are switched on.
+    #[serde(default)]
+    without: Vec<String>,
+    #[serde(default)]
+    with: Vec<String>,
     agent: Option<String>,
     seed: Option<u64>,
     /// A study has this in place of `seed`.
@@ -114,6 +119,8 @@ fn conditions(settings: &str) -> Vec<(&'static str, String)> {
         ("Space", Some(of.space)),
         ("Driving system", Some(driver)),
         ("Traffic", Some(traffic)),
+        ("Switched off", (!of.without.is_empty()).then(|| of.without.join(", "))),
+        ("Switched on", (!of.with.is_empty()).then(|| of.with.join(", "))),
         ("Agent", of.agent),
         ("Roads", Some(of.roads.join(", "))),
         ("Seed", of.seed.or(of.first_seed).map(|seed| seed.to_string())),

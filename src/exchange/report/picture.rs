@@ -444,7 +444,11 @@ fn caption(svg: &mut String, (left_px, top_px): (f64, f64), moment: &Snapshot, s
         (r##"font-size="13" font-weight="bold" fill="#14181f""##, format!("{time_s:.2} s{when}")),
         (
             r##"font-size="12" fill="#14181f""##,
-            format!("ego {}, {pedals}; held by: {}", kmh(world.ego().speed_mps), moment.status.reason_text()),
+            format!(
+                "ego {}, {pedals}; limited by: {}",
+                kmh(world.ego().speed_mps),
+                moment.status.reason_text()
+            ),
         ),
         (r##"font-size="12" fill="#5a6372""##, sky),
     ];

@@ -191,7 +191,7 @@ fn played(
         "steps": log.steps.len(), "actions": log.steps.iter().filter(|step| matches!(step.outcome, Outcome::Done { .. })).count(),
         "collisions": collisions.iter().map(without_ways).collect::<Vec<_>>(),
         "refuted": refuted, "same": is_same, "breaches": breaches(table, scenario, &log),
-        "crashes": crashes(table, &log),
+        "crashes": crashes(table, &log), "failure": log.failure.as_ref().map(avastra_drivers::external::Failure::in_words),
     });
     let steps: Vec<Value> =
         log.steps.iter().enumerate().map(|(index, _)| step(table, &log, index, offers.get(index))).collect();
@@ -211,12 +211,21 @@ fn played(
     Ok(Recording { log, main, main_counts, is_same, refuted, summary, packed, ground })
 }
 
+/// A longer profile is not printed.
+const PROFILE_LETTERS_MAX: usize = 60;
+
 /// Where a scenario comes from: name and text of each.
 fn origin(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Vec<(&'static str, String)> {
     let origin = &scenario.origin;
     let space = table.space().path.file_name().map(|name| name.to_string_lossy().into_owned());
     let driver = match &origin.profile {
-        Some(profile) if origin.ads.as_deref() == Some(ads.name()) => format!("{} {profile}", ads.name()),
+        // A long one stands in the source, which the page shows.
+        Some(profile)
+            if origin.ads.as_deref() == Some(ads.name()) && profile.len() <= PROFILE_LETTERS_MAX =>
+        {
+            format!("{} {profile}", ads.name())
+        }
+        Some(_) if origin.ads.as_deref() == Some(ads.name()) => format!("{}, with its profile", ads.name()),
         _ => ads.name().to_owned(),
     };
     let known = [

@@ -872,7 +872,9 @@ pub(super) fn unknown_here(thing: &str, span: Span, site: Site) -> Diagnostic {
             .help("write a rule on the action, or draw the parameter with `any`"),
         _ => error
             .at(span, format!("{SEEN_BY} the {}", if thing == "npc" { "newcomer" } else { thing }))
-            .help(format!("write a rule, or pass a function what it needs: `f({thing}.{asked})`")),
+            .help(format!(
+                "in an action, draw a value and bind it: `any x: … where x == {thing}.{asked}`; a function gets it as an argument"
+            )),
     }
 }
 

@@ -243,7 +243,7 @@ facts! {
     EgoOffset "ego.offset" LENGTH, World, moment.ego_offset_m =
         "`Length`: lateral offset from the route, positive to the left.";
     EgoFront "ego.front" LENGTH, World, moment.ego_front_m =
-        "`Length`: station of its front on the route, which begins at 0 m under its rear axle.";
+        "`Length`: station of its front on the route. The route begins at 0 m, under its rear axle at the start.";
     EgoRear "ego.rear" LENGTH, World, moment.ego_rear_m =
         "`Length`: station of its rear on the route. It is 4.70 m long and 2.06 m wide.";
     RoadUsers "road_users" Type::Int, World, moment.road_users in Users =
@@ -357,7 +357,7 @@ facts! {
     Repeated "repeated" Type::Bool, Step, outcome.repeated =
         "`Bool`: with an obstacle that it has hit before. Today an obstacle is hit once, so this never holds.";
     Sudden "sudden" Type::Bool, Step, outcome.sudden =
-        "`Bool`: with an obstacle that had appeared less than 0.75 s before.";
+        "`Bool`: with an obstacle that had appeared at most 0.75 s before.";
     Struck "struck" Type::Bool, Step, outcome.struck =
         "`Bool`: the ego vehicle did not have to give way, and the obstacle ran into its side, a front corner or its rear, or into any part of it while it stood.";
     Avoidable "avoidable" Type::Bool, Judgement, outcome.avoidable =

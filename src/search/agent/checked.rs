@@ -17,6 +17,8 @@ pub enum SettingsError {
     Text(String),
     #[error("no preset `{name}` for this agent: it has {known}")]
     Preset { name: String, known: String },
+    #[error("the settings say `preset: {own}`, and `--preset {asked}` was asked for: leave one of them out")]
+    TwoPresets { own: String, asked: String },
     #[error("no setting `{name}`{hint}")]
     Unknown { name: String, hint: String },
     #[error("this agent has no setting `{name}`: it is one of {owners}")]

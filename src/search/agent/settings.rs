@@ -106,7 +106,13 @@ impl Settings {
 /// The settings of a learner: those of a preset with the changes of a YAML text.
 fn from_preset(presets: &[Preset], preset: Option<&str>, text: &str) -> Result<Settings, SettingsError> {
     let changes = lines(text)?;
-    let name = changes.get("preset").and_then(Value::as_str).or(preset).unwrap_or(presets[0].name);
+    let own = changes.get("preset").and_then(Value::as_str);
+    if let (Some(own), Some(asked)) = (own, preset)
+        && own != asked
+    {
+        return Err(SettingsError::TwoPresets { own: own.to_owned(), asked: asked.to_owned() });
+    }
+    let name = own.or(preset).unwrap_or(presets[0].name);
     let Some(base) = presets.iter().find(|known| known.name == name) else {
         let known = listed(&presets.iter().map(|preset| preset.name).collect::<Vec<_>>());
         return Err(SettingsError::Preset { name: name.to_owned(), known });

@@ -11,7 +11,7 @@ use crate::scene::way::Way;
 use crate::state::change::PlannedChange;
 use crate::state::driver::{Cruise, Driver};
 use crate::state::ego::VehicleParameters;
-use crate::state::obstacle::Moved;
+use crate::state::obstacle::{Moved, Obstacle};
 use crate::state::road_user::{Motion, Mover, RoadUser};
 use crate::view::around::Around;
 use avastra_lang::model::body::BodyParameters;
@@ -64,7 +64,16 @@ pub fn finish(asked: &Asked, motion: Motion, moved: Moved) -> Result<RoadUser, S
         Some(other) if core::ptr::eq(other.outline, around.ego().outline) => {
             Err("the ego vehicle is there".into())
         }
-        Some(_) => Err("another road user is there".into()),
+        Some(other) => {
+            let is_it = |obstacle: &&Obstacle| {
+                core::ptr::eq(&raw const obstacle.outline, core::ptr::from_ref(other.outline))
+            };
+            let who = around
+                .obstacles()
+                .find(is_it)
+                .map_or_else(|| "another road user".to_owned(), |obstacle| format!("npc#{}", obstacle.id));
+            Err(format!("{who} is there, or nearer than {room_m:.1} m"))
+        }
     }
 }
 

@@ -27,6 +27,7 @@ use crate::scene::lanes::may_use;
 use crate::state::driver::Driver;
 use crate::state::ego::VehicleParameters;
 use crate::state::guided::Guided;
+use crate::state::obstacle::Obstacle;
 use crate::state::road_user::{Motion, Mover};
 use crate::view::around::Around;
 use crate::view::moment::npc_facts;
@@ -181,11 +182,16 @@ fn meets_route(around: &Around, mover: &Mover) -> bool {
 /// the rules of the space say how near to it a newcomer may appear.
 fn check_way(around: &Around, driver: &Driver, size: &BodyParameters) -> Result<(), String> {
     let braking_mps2 = around.braking_mps2(size, driver.speed_mps);
-    let blocked = around.obstacles().any(|other| {
-        driver.gap_to(size, other.into()).is_some_and(|(gap_m, speed_mps)| {
-            let closing_mps = (driver.speed_mps - speed_mps).max(0.0);
-            gap_m < 1.0 + braking_m(closing_mps, braking_mps2) + 0.1 * closing_mps
-        })
-    });
-    if blocked { Err("another road user is too near in its lane".into()) } else { Ok(()) }
+    let blocks = |other: &Obstacle| {
+        let (gap_m, speed_mps) = driver.gap_to(size, other.into())?;
+        let closing_mps = (driver.speed_mps - speed_mps).max(0.0);
+        let needed_m = 1.0 + braking_m(closing_mps, braking_mps2) + 0.1 * closing_mps;
+        (gap_m < needed_m).then_some((other.id, gap_m, needed_m))
+    };
+    match around.obstacles().find_map(blocks) {
+        None => Ok(()),
+        Some((id, gap_m, needed_m)) => Err(format!(
+            "npc#{id} is too near ahead in its lane: {gap_m:.1} m, and {needed_m:.1} m are needed to brake behind it"
+        )),
+    }
 }

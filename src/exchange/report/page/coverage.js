@@ -26,7 +26,8 @@ export function coverage(overview) {
       "p",
       { class: "legend" },
       isOffered
-        ? "● steps in which it was carried out, of those in which it was legal · ◐ legal, and never chosen · " +
+        ? "● steps in which it was carried out, of those in which the agent looked at it and it was legal · " +
+            "◐ legal, and never chosen · " +
             "○ never legal, with what refused it most often · – not offered"
         : "● steps in which it was carried out · – never chosen",
     ),
@@ -40,7 +41,7 @@ export function coverage(overview) {
           "caption",
           {},
           "Steps in which each row of the action table was carried out" +
-            (isOffered ? ", of those in which it was legal." : "."),
+            (isOffered ? ", of those in which the agent looked at it and it was legal." : "."),
         ),
         el(
           "thead",

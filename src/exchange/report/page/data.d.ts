@@ -40,6 +40,8 @@ export interface Summary {
   same: boolean | null;
   breaches: Breach[];
   crashes: Crash[];
+  /** Why the driving system failed, if it did. */
+  failure: string | null;
 }
 
 /** Two road users crash into each other, not into the ego vehicle. */

@@ -11,7 +11,9 @@ const withBounds = (value, found) => (value === null ? "–" : `${short(value)}$
 
 const METHODS = {
   count: "Method: counting; exact intervals after Clopper and Pearson.",
-  probe: "Method: dangerous rows are tried out beside those that chance chooses, and weighted; intervals after Fay and Feuer.",
+  probe:
+    "Method: dangerous rows are tried out beside those that chance chooses, and weighted; " +
+    "intervals after Fay and Feuer.",
 };
 
 /** The whole estimate; `frame` says what its rates are rates of. */

@@ -247,7 +247,7 @@ function outcomeInWords(outcome, rows) {
  */
 export function showSteps(place, recording, seek) {
   const { steps, rows, obstacles } = recording.header;
-  const phases = obstacles.flatMap(({ id, phases = [] }) => phases.map(([atS, what]) => ({ id, atS, what })));
+  const phases = obstacles.flatMap((one) => (one.phases ?? []).map(([atS, what]) => ({ id: one.id, atS, what })));
   const shown = steps.map((step, number) => {
     const endS = steps[number + 1]?.at_s ?? Infinity;
     const begun = phases.filter(({ atS }) => atS > step.at_s - 1e-6 && atS < endS - 1e-6);

@@ -1,5 +1,5 @@
-// What came of actions by the values of their parameters, as the maps of a protocol: green where the ego vehicle kept clear, red where it
-// hit at nearly the speed before.
+// What came of actions by the values of their parameters, as the maps of a protocol: green where the ego vehicle kept
+// clear, red where it hit at nearly the speed before.
 import { el } from "./dom.js";
 import { linkOf, nameOf } from "./link.js";
 import { figure, plural } from "./words.js";
@@ -44,8 +44,9 @@ export function heat(overview, scenarios) {
       "p",
       { class: "legend" },
       HEAT_ENDINGS.map((ending, at) => [el("span", { class: `heat-${at}` }, `${HEAT_SIGNS[at]} ${ending}`), " "]),
-      "· ⚑ a requirement was breached · a near miss had a time to collision or a post-encroachment time below 1.5 s; a mitigated contact was at least 5 km/h slower than the speed before · with the " +
-        "mean speed at contacts of the two against each other, in brackets that of the ego vehicle and what it lost",
+      "· ⚑ a requirement was breached · a near miss had a time to collision or a post-encroachment time below 1.5 s; " +
+        "a mitigated contact was at least 5 km/h slower than the speed before · with the mean speed at contacts of " +
+        "the two against each other, in brackets that of the ego vehicle and what it lost",
     ),
     maps.map((map) => heatMap(map, scenarios)),
   );
@@ -58,7 +59,13 @@ function heatMap({ action, about, down, across, rows, columns, cells }, scenario
     el("th", { scope: "col" }, across ? `${down} ↓ ${across} →` : down),
     columns.map((column) => el("th", { scope: "col" }, column || "all")),
   );
-  const line = (label, at) => el("tr", {}, el("th", { scope: "row" }, label), cells[at].map((cell) => heatCell(cell, scenarios)));
+  const line = (label, at) =>
+    el(
+      "tr",
+      {},
+      el("th", { scope: "row" }, label),
+      cells[at].map((cell) => heatCell(cell, scenarios)),
+    );
   const what = `${action}, by ${across ? `${down} and ${across}` : down}`;
   return el(
     "div",

@@ -70,7 +70,12 @@ export function filtered(scenarios) {
 export function kindOf(entry) {
   const collision = mainCollision(entry.summary);
   const [breach] = entry.summary.breaches;
-  if (!collision) return breach ? `breach of ${breach.requirement}` : `ended: ${entry.summary.end}`;
+  if (!collision)
+    return breach
+      ? `breach of ${breach.requirement}`
+      : entry.summary.failure
+        ? "driving system failed"
+        : "nothing found, kept to look at";
   const { precrash, precrash_number, cause } = collision;
   const because = cause ? `, ${causeInWords(cause)}` : "";
   return `${precrash_number ? `${precrash_number} ` : ""}${precrash}${because}`;
@@ -199,8 +204,8 @@ function listing(list) {
   });
   const heads = [["Scenario"], ...shown].map(([name, , kind]) => el("th", { scope: "col", class: kind }, name));
   const caption =
-    "Scenarios, worst first: those that count, of these first those that recur under other noise (the 95 % interval of the " +
-    "share of replays lies above one half), then by the speed of the impact beside what people bear.";
+    "Scenarios, worst first: those that count, of these first those that recur under other noise (the 95 % interval " +
+    "of the share of replays lies above one half), then by the speed of the impact beside what people bear.";
   drawWhenSeen(thumbs, list);
   return el(
     "div",

@@ -263,8 +263,8 @@ export class Recording {
   }
 
   /**
-   * The event that a replay is opened for: the collision; else a breach; else the nearest approach; else the beginning of a
-   * manoeuvre; else the first action.
+   * The event that a replay is opened for: the collision; else a breach; else the nearest approach; else the beginning
+   * of a manoeuvre; else the first action.
    * @returns {{ at_s: number, what: string, obstacle: number | null } | null}
    */
   event() {
@@ -272,6 +272,8 @@ export class Recording {
     if (collision) return { at_s: collision.at_s, what: "contact", obstacle: collision.obstacle };
     const [breach] = this.header.summary.breaches;
     if (breach) return { at_s: breach.at_s, what: `breach of ${breach.requirement}`, obstacle: breach.obstacle };
+    const { failure, duration_s: endS } = this.header.summary;
+    if (failure) return { at_s: endS, what: "the driving system fails", obstacle: null };
     const nearest = this.nearest();
     if (nearest && nearest.distance_m <= NEAR_M) {
       return { at_s: nearest.at_s, what: "nearest approach", obstacle: nearest.obstacle };
@@ -292,6 +294,7 @@ export class Recording {
     const { ego, obstacles } = this.header;
     const spawned = obstacles.filter((one) => !one.ambient);
     const [egoX, egoY] = ego.places.map((column) => this.columns[column]);
+    /** @type {{ at_s: number, distance_m: number, obstacle: number } | null} */
     let found = null;
     for (const one of spawned.length > 0 ? spawned : obstacles) {
       const [x, y] = one.places.map((column) => this.columns[column]);

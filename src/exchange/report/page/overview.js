@@ -164,29 +164,39 @@ function totals({ totals: sums, simulated_h: simulatedH, requirements, mixed }) 
       tile(figure(sums.driven_m / 1000, "km", 1), "driven"),
       tile(simulated(simulatedH), "of simulated time"),
       tile(sums.red_runs, "red lights passed", sums.red_runs > 0 ? "bad" : ""),
+      sums.stalled > 0 &&
+        tile(sums.stalled, "episodes in which it got stuck", 2 * sums.stalled > sums.episodes ? "bad" : ""),
     ),
     el(
       "p",
       { class: "muted" },
       `Episodes ended: ${said}. Of all collisions, a careful driver would have avoided ${sums.avoidable}, ` +
-        `only a quicker one or an evasive manoeuvre ${sums.beyond_reference}, none ${sums.unavoidable}; the ego vehicle had priority in ` +
+        `only a quicker one or an evasive manoeuvre ${sums.beyond_reference}, none ${sums.unavoidable}; ` +
+        `the ego vehicle had priority in ` +
         `${sums.wronged}, the other in ${sums.wrong}.` +
         (sums.replayed > 0
-          ? ` Of ${plural(sums.replayed, "finding")} played again under other noise, ${sums.recurring} recur: the 95 % interval ` +
-            `of the share of replays lies above one half${mixed ? `; ${mixed}` : ""}.`
+          ? ` Of ${plural(sums.replayed, "finding")} played again under other noise, ${sums.recurring} recur, which ` +
+            `means that the 95 % interval of the share of replays lies above one half${mixed ? `; ${mixed}` : ""}.`
           : "") +
         (sums.red_unkept > 0
-          ? ` ${plural(sums.red_unkept, "episode")} with a red light passed kept as no scenario: nothing of the space asks about it.`
+          ? ` ${plural(sums.red_unkept, "episode")} with a red light passed kept as no scenario: ` +
+            `nothing of the space asks about it.`
           : ""),
     ),
   );
 }
 
-/** Every requirement in force: what it asks, whether it was kept and by how much, and for how long it was asked at all. */
+/** Every requirement in force: what it asks, whether it was kept and by how much, and for how long it was asked. */
 function required({ requirements }, scenarios) {
   if (!requirements || requirements.length === 0) return null;
   const rows = requirements.map((of) => [
-    el("details", {}, el("summary", {}, of.requirement), of.formula && el("code", {}, of.formula), of.docs && el("p", {}, of.docs)),
+    el(
+      "details",
+      {},
+      el("summary", {}, of.requirement),
+      of.formula && el("code", {}, of.formula),
+      of.docs && el("p", {}, of.docs),
+    ),
     verdictOf(of),
     of.breaches > 0 ? `${of.breaches} in ${plural(of.breached_in, "episode")}` : "0",
     of.tried_in > 0 ? `${of.kept_in} of ${of.tried_in}` : "–",
@@ -194,7 +204,15 @@ function required({ requirements }, scenarios) {
     of.asked_in > 0 ? `${figure(of.asked_s, "s", 1)} in ${plural(of.asked_in, "episode")}` : "never asked",
     exampleOf(of, scenarios),
   ]);
-  const heads = ["Requirement", "Result", "Breaches", "Episodes kept by a careful driver", "Margin", "Asked", "Example"];
+  const heads = [
+    "Requirement",
+    "Result",
+    "Breaches",
+    "Episodes kept by a careful driver",
+    "Margin",
+    "Asked",
+    "Example",
+  ];
   return el(
     "section",
     { "aria-labelledby": "h-required", id: "required" },

@@ -8,7 +8,8 @@ import { figure } from "./words.js";
 
 /**
  * Where a row is drawn, and of which drives.
- * @typedef {{ canvas: any, axis: TimeAxis, recording: Recording, other: Recording | null, top: number, height: number }} Box
+ * @typedef {{ canvas: any, axis: TimeAxis, recording: Recording, other: Recording | null, top: number,
+ *   height: number }} Box
  * @typedef {{ label: string, height: number, draw: (box: Box) => void }} PlotRow
  */
 

@@ -10,7 +10,15 @@ import { Plots } from "./plots.js";
 import { showSource } from "./source.js";
 import { drawStrip } from "./strip.js";
 import { LAYERS_AT_FIRST, View } from "./view.js";
-import { atTime, breachInWords, changeInWords, collisionInWords, driverInWords, mainCollision } from "./words.js";
+import {
+  atTime,
+  breachInWords,
+  changeInWords,
+  collisionInWords,
+  driverInWords,
+  figure,
+  mainCollision,
+} from "./words.js";
 
 /** @import { Entry, Index } from "./data" */
 /** @import { Recording } from "./moment.js" */
@@ -285,9 +293,10 @@ export class Watch {
   }
 }
 
-/** What was found, in a sentence: the collision, else the first breach. */
-function foundInWords(collision, { road, breaches }) {
+/** What was found, in a sentence: the collision, else the first breach, else why the driving system failed. */
+function foundInWords(collision, { road, breaches, failure, duration_s: endS }) {
   if (collision) return `${collisionInWords(collision, road)}.`;
+  if (failure && breaches.length === 0) return `The driving system failed after ${figure(endS, "s", 2)}: ${failure}.`;
   return breaches.length > 0 ? `${breachInWords(breaches[0])} on ${road}.` : "No collision.";
 }
 
@@ -296,8 +305,8 @@ function precision(steps) {
     "p",
     { class: "muted fine" },
     `Drawn from numbers that are exact to ±${steps.place_m * 1000} mm, ±${steps.heading_rad * 1000} mrad, ` +
-      `±${steps.speed_mps} m/s and ±${steps.probability} (ProC, every 0.1 s) at every tick of ${steps.tick_s} s; plans and ` +
-      `predictions to ±${steps.sketch_m * 100} cm every ${steps.thought_s} s, what is perceived every ` +
-      `${steps.perceived_s} s. Between ticks places are interpolated.`,
+      `±${steps.speed_mps} m/s and ±${steps.probability} (ProC, every 0.1 s) at every tick of ` +
+      `${steps.tick_s} s; plans and predictions to ±${steps.sketch_m * 100} cm every ${steps.thought_s} s, what is ` +
+      `perceived every ${steps.perceived_s} s. Between ticks places are interpolated.`,
   );
 }
