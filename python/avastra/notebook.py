@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, List, Union
 
 from .engine import read_run
-from .program import found as where
+from .program import path_of
 
 __all__ = ["Run", "Scenario", "runs"]
 
@@ -33,7 +33,7 @@ class _Page:
     def report(self) -> str:
         """The page of `avastra report`: self-contained HTML, which plays every scenario again to show it."""
         named = os.environ.get("AVASTRA", "avastra")
-        program = where(named)
+        program = path_of(named)
         if program is None:
             raise FileNotFoundError(f"there is no program `{named}`, which draws the page: `cargo install --locked --path .` in avastra's "
                                     "repository installs it, or name it with the environment variable AVASTRA")

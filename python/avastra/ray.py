@@ -25,7 +25,7 @@ import subprocess
 import sys
 from typing import Any, Callable, Deque, Dict, Iterable, List, NoReturn, Optional, Sequence, Tuple
 
-from .program import found as where
+from .program import path_of
 
 COMMANDS = ("run", "study", "estimate")
 #: How often Ray plays a shard again whose worker or program was killed.
@@ -81,7 +81,7 @@ def play(number: int, shards: int, work: Work) -> Tuple[int, str]:
     for folder in (work["working_directory"], work["folder"]):
         if not os.path.isdir(folder):
             return 1, f"there is no folder `{folder}` on node {node}: all nodes must see the same files"
-    if where(work["program"]) is None:
+    if path_of(work["program"]) is None:
         return 1, f"there is no program `{work['program']}` on node {node}"
     out = os.path.join(work["folder"], str(number))
     command = [work["program"], work["command"]]
@@ -117,7 +117,7 @@ def _parsed(arguments: Optional[Sequence[str]]) -> Tuple[argparse.Namespace, Lis
                         help="the program [default: AVASTRA, or `avastra` in the PATH]")
     # What `--resume` takes, too: see `_anew`.
     parser.add_argument("--reuse", metavar="DIR", help=argparse.SUPPRESS)
-    parser.add_argument("--fail-on", help=argparse.SUPPRESS)
+    parser.add_argument("--fail-on", action="append", help=argparse.SUPPRESS)
     # What is for the output of the whole.
     parser.add_argument("--format", help=argparse.SUPPRESS)
     parser.add_argument("--color", help=argparse.SUPPRESS)
@@ -152,7 +152,7 @@ def _number(text: str) -> int:
 
 
 def _program(program: str) -> str:
-    found = where(program)
+    found = path_of(program)
     if found is None:
         raise Refused(f"there is no program `{program}`: `cargo install --locked --path .` in avastra's repository installs it, or name it "
                       "with `--program` or AVASTRA")
@@ -183,7 +183,7 @@ def _shards_max(options: argparse.Namespace, passed: List[str]) -> int:
 
 def _anew(options: argparse.Namespace) -> List[str]:
     """What is said again of a shard that is gone on with."""
-    return [*(["--reuse", options.reuse] if options.reuse else []), *(["--fail-on", options.fail_on] if options.fail_on else [])]
+    return [*(["--reuse", options.reuse] if options.reuse else []), *(["--fail-on", ",".join(options.fail_on)] if options.fail_on else [])]
 
 
 def _cluster(options: argparse.Namespace, passed: List[str], shards: Optional[int], most: int) -> int:

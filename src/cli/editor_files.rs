@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use avastra_base::outside::Shown;
 use avastra_base::units;
 use avastra_editor::words::{self, Entry};
-use avastra_lang::model::vocabulary::{Site, StopReason};
+use avastra_lang::model::vocabulary::{Fact, Site, StopReason, Word, WordFact};
 use avastra_lang::syntax::keyword;
 
 use super::arguments::EditorFilesArguments;
@@ -62,6 +62,16 @@ fn facts() -> Vec<&'static str> {
     facts
 }
 
+/// The facts with those of things, such as `ego.speed`, for editors whose words may have dots.
+fn all_facts() -> Vec<&'static str> {
+    let dotted = Fact::names().chain(WordFact::names()).filter(|name| name.contains('.'));
+    let mut all: Vec<&str> = facts().into_iter().chain(dotted).collect();
+    all.sort_unstable();
+    // A word that is a keyword, too, has its colour.
+    all.retain(|name| !keyword::keywords().any(|(word, _)| word == name));
+    all
+}
+
 /// The syntax file of Vim and Neovim.
 fn vim() -> String {
     let mut text = "\" The syntax of avastra's files, written by `avastra editor-files`.\n\
@@ -75,7 +85,7 @@ fn vim() -> String {
         ("avaLiteral", names(keyword::LITERALS)),
         ("avaType", names(&words::types())),
         ("avaWord", engine_words()),
-        ("avaFact", facts()),
+        ("avaFact", all_facts()),
     ] {
         text += &format!("syntax keyword {group} {}\n", words.join(" "));
     }
@@ -106,7 +116,7 @@ fn vim() -> String {
 /// The language of highlight.js, which mdBook uses. A page is coloured before this is loaded, so its blocks are coloured again.
 fn highlight() -> String {
     let keyword = [names(keyword::DECLARATIONS), names(keyword::CLAUSES), names(keyword::OPERATORS)].concat();
-    let built_in = [engine_words(), facts()].concat();
+    let built_in = [engine_words(), all_facts()].concat();
     let keywords = json!({
         "$pattern": r"[A-Za-z_][A-Za-z0-9_.]*",
         "keyword": keyword.join(" "),

@@ -27,7 +27,7 @@ pub enum Failure {
     },
     #[error("requirements were breached in {count}", count = super::output::plural(*episodes, "episode"))]
     Breach { episodes: usize },
-    #[error("{count} recur under other noise", count = super::output::plural(*findings, "finding"))]
+    #[error("{count} under other noise", count = recurring(*findings))]
     Recurring { findings: usize },
     #[error("the ego vehicle got stuck in {count}", count = super::output::plural(*episodes, "episode"))]
     Stalled { episodes: usize },
@@ -88,6 +88,15 @@ impl Failure {
             Failure::Stopped | Failure::Interrupted { .. } => 130,
         }
     }
+}
+
+/// How many findings recur, in words.
+fn recurring(findings: usize) -> String {
+    format!(
+        "{} {}",
+        super::output::plural(findings, "finding"),
+        if findings == 1 { "recurs" } else { "recur" }
+    )
 }
 
 impl From<RunError> for Failure {

@@ -28,7 +28,7 @@ Exit status:
        `replay`, `run --fail-on`; `run` and `train` if it drove no
        episode to its end, or could not be reached any more)
        Of several, the first in this order holds: 1 and 2 before 3, 4, 5.
-  130  Ctrl-C (143: SIGTERM). `run`, `train`, `study` and `estimate DIR` save
+  130  Ctrl-C or SIGTERM (143: a second SIGTERM). `run`, `train`, `study` and `estimate DIR` save
        what was done, and `--resume` goes on
 
 `avastra COMMAND --help` has examples. `avastra explain` lists every diagnostic,

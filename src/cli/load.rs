@@ -498,7 +498,7 @@ pub fn read_used(path: &Path) -> Result<String, ReadError> {
 pub fn read_named(path: &Path, extensions: &[&str], what_else: &str) -> Result<String, ReadError> {
     let followed = path.canonicalize().map_err(|error| {
         let meant = beside(path).map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));
-        unread(&error, &meant)
+        unread(path, &error, &meant)
     })?;
     let is_of_the_kind = |path: &Path| {
         path.extension().is_some_and(|extension| extensions.iter().any(|known| extension == *known))
@@ -523,18 +523,16 @@ fn beside(missing: &Path) -> Option<String> {
     Some(format!("{near}.{extension}"))
 }
 
-/// The error of the system, and what the user may have meant.
-fn unread(error: &std::io::Error, meant: &str) -> ReadError {
+/// The error of the system, and what the user may have meant. A link whose target is not there is no missing file.
+fn unread(path: &Path, error: &std::io::Error, meant: &str) -> ReadError {
     let reason = format!("{}{meant}", reason(error));
-    match error.kind() {
-        std::io::ErrorKind::NotFound => ReadError::missing(reason),
-        _ => ReadError::new(reason),
-    }
+    let is_missing = error.kind() == std::io::ErrorKind::NotFound && path.symlink_metadata().is_err();
+    if is_missing { ReadError::missing(reason) } else { ReadError::new(reason) }
 }
 
 /// Reads a text file of a limited size. A pipe would wait, a device has no end: only regular files are read.
 fn read_up_to(path: &Path, bytes_max: u64) -> Result<String, ReadError> {
-    let unread = |error| unread(&error, "");
+    let unread = |error| unread(path, &error, "");
     let metadata = std::fs::metadata(path).map_err(unread)?;
     if metadata.is_dir() {
         return Err(ReadError::new(FOLDER.to_owned()));

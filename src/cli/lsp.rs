@@ -298,7 +298,11 @@ impl Server {
             "textDocument/definition" => {
                 let (path, byte) = self.place(params)?;
                 let found = navigate::definition(self.known(&path)?, byte);
-                Ok(found.map_or(Value::Null, |places| places.iter().map(|of| self.location(of)).collect()))
+                let places = |places: Vec<Place>| {
+                    let places = places.iter().filter(|of| self.can_be_opened(&of.path));
+                    places.map(|of| self.location(of)).collect()
+                };
+                Ok(found.map_or(Value::Null, places))
             }
             "textDocument/references" => {
                 let (path, byte) = self.place(params)?;
@@ -319,7 +323,12 @@ impl Server {
                 let (path, byte) = self.place(params)?;
                 let name = params["newName"].as_str().ok_or(Refusal::Params("newName"))?;
                 let changes = rename::rename(&mut self.workspace, &path, byte, name);
-                Ok(self.edit(&changes.map_err(Refusal::Impossible)?))
+                let changes = changes.map_err(Refusal::Impossible)?;
+                if let Some(path) = changes.keys().find(|path| !self.can_be_opened(path)) {
+                    let reason = format!("it is declared in `{}`, which is built in", path.shown());
+                    return Err(Refusal::Impossible(reason));
+                }
+                Ok(self.edit(&changes))
             }
             "textDocument/formatting" => {
                 let path = self.document(params)?;
@@ -344,7 +353,7 @@ impl Server {
                 let found = structure::links(self.analysis(&path)?);
                 let link =
                     |(of, path): &(Range, PathBuf)| json!({ "range": range(*of), "target": self.uri(path) });
-                Ok(found.iter().map(link).collect())
+                Ok(found.iter().filter(|(_, path)| self.can_be_opened(path)).map(link).collect())
             }
             "textDocument/signatureHelp" => {
                 let (path, byte) = self.place(params)?;
@@ -498,6 +507,11 @@ impl Server {
     /// The URI by which the editor knows a file.
     fn uri(&self, path: &Path) -> String {
         self.documents.get(path).map_or_else(|| uri::from_path(path), |document| document.uri.clone())
+    }
+
+    /// Whether an editor finds the file: one that is built in need not be there.
+    fn can_be_opened(&self, path: &Path) -> bool {
+        self.documents.contains_key(path) || path.exists()
     }
 
     fn location(&self, place: &Place) -> Value {

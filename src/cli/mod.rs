@@ -90,8 +90,10 @@ pub fn main() -> ExitCode {
     ExitCode::from(main_of(std::env::args_os().collect()))
 }
 
-/// Runs the command of a command line, whose first word is the program's name, and returns its exit status. A process may
-/// do so once.
+/// Runs the command of a command line, whose first word is the program's name, and returns its exit status.
+///
+/// # Panics
+/// If it was called before in this process.
 pub fn main_of(words: Vec<OsString>) -> u8 {
     let words = output::begin(words);
     // File names end up in files and in JSON, which are text. So this is said before anything is played.

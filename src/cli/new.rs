@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::builder::PossibleValuesParser;
 
-use avastra_base::outside::{Shown, in_comment};
+use avastra_base::outside::{Shown, in_comment, in_line};
 use avastra_campaign::emit;
 use avastra_road::{RoadMap, Route, propose};
 
@@ -141,10 +141,15 @@ fn example(name: &str) -> Vec<(String, String)> {
     files
 }
 
-/// Steps in which a driving system arrives that waits at lights and for others: a mean of 5 m/s in steps of 6 s, and at
-/// least what the space to begin with has.
+/// The limit of the space to begin with.
+const STARTER_LIMIT: &str = "limit: 20 steps";
+/// Its step, s, and a mean speed at which a driving system arrives that waits at lights and for others, m/s. Ours.
+const STARTER_STEP_S: f64 = 6.0;
+const ARRIVES_MPS: f64 = 5.0;
+
+/// Steps in which a driving system arrives, at least those of the space to begin with.
 fn steps_for(length_m: f64) -> u32 {
-    ((length_m / 30.0).ceil() as u32).max(20)
+    ((length_m / (ARRIVES_MPS * STARTER_STEP_S)).ceil() as u32).max(20)
 }
 
 /// The space to begin with, on proposed routes of a map, with the map.
@@ -152,7 +157,7 @@ fn on_map(output: &Output, path: &Path) -> Result<Vec<(String, String)>, Failure
     let text = load::text(path)?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let map = RoadMap::from_opendrive(&stem, &text).map_err(|error| Failure::file("read", path, error))?;
-    map.warnings.iter().for_each(|warning| output.warn(&in_comment(warning)));
+    map.warnings.iter().for_each(|warning| output.warn(&in_line(warning)));
     let proposals = propose(&map, ROUTES_MAX);
     if proposals.is_empty() {
         let message = "no way on it can be driven; `avastra road` tells what it holds";
@@ -178,6 +183,7 @@ fn on_map(output: &Output, path: &Path) -> Result<Vec<(String, String)>, Failure
     let routes = proposals.iter().filter_map(|way| Route::find(&map, way.start, way.goal).ok());
     let longest_m = routes.map(|route| route.path.length_m()).fold(0.0, f64::max);
     let space = STARTER[0].1.replace("roads: [corner]", &format!("roads: [{}]", names.join(", ")));
-    let space = space.replace("limit: 20 steps", &format!("limit: {} steps", steps_for(longest_m)));
+    assert!(space.contains(STARTER_LIMIT), "the space to begin with has its limit");
+    let space = space.replace(STARTER_LIMIT, &format!("limit: {} steps", steps_for(longest_m)));
     Ok(vec![("space.ava".to_owned(), space), ("roads.ava".to_owned(), roads), (file, text)])
 }

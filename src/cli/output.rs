@@ -243,9 +243,13 @@ impl Output {
 /// The command line that is being carried out.
 static WORDS: OnceLock<Vec<OsString>> = OnceLock::new();
 
-/// Keeps the words of the command line; those of the first call hold.
+/// Keeps the words of the command line.
+///
+/// # Panics
+/// If a command was begun before in this process.
 pub fn begin(words: Vec<OsString>) -> &'static [OsString] {
-    WORDS.get_or_init(|| words)
+    assert!(WORDS.set(words).is_ok(), "a process carries out one command");
+    WORDS.get().expect("it was just set")
 }
 
 /// The words of the command line behind the program's name.

@@ -16,7 +16,7 @@ use avastra_campaign::run::{
 };
 use avastra_drivers::ModularConfig;
 use avastra_drivers::external::{Conversation, Problem};
-use avastra_lang::model::Policy;
+use avastra_lang::model::{Policy, Space};
 use avastra_search::agent::{Face, Kind, by_name};
 use avastra_world::action::{ActionTable, Draw};
 
@@ -88,26 +88,34 @@ impl Cut for RunSettings {
 
 /// Plays the episodes of a new run, or those that an interrupted one still lacks.
 pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
-    let lacks_replays = |replays: u32| match replays == 0 && arguments.fail_on.contains(&FailOn::Recurring) {
-        true => Err(Failure::usage(
-            "`--fail-on recurring` needs replays, and the run has `--replays 0`: begin one with `--replays 20`",
-        )),
-        false => Ok(()),
-    };
     let begun = match &arguments.resume {
         Some(path) => Some(resumed(output, path, false)?),
-        None => {
-            lacks_replays(arguments.replays)?;
-            begun(output, arguments)?
-        }
+        None => begun(output, arguments)?,
     };
     let Some(((run, directory), elsewhere)) = begun else { return Ok(()) };
-    lacks_replays(run.settings().replays)?;
+    can_fail_on(&arguments.fail_on, run.space(), run.settings().replays)?;
     output.tell(&format!("{}, into {}", heading(&run), directory.path.shown()));
     conditions::ambient_text(&run).iter().for_each(|text| output.tell(text));
     elsewhere.iter().for_each(|text| output.warn(text));
     let found = play_all(output, (run, directory), elsewhere, arguments.jobs)?;
     failed_on(&found, &arguments.fail_on)
+}
+
+/// Refuses to fail on what a run cannot find.
+fn can_fail_on(fail_on: &[FailOn], space: &Space, replays: u32) -> Result<(), Failure> {
+    let why = match () {
+        () if fail_on.contains(&FailOn::Recurring) && replays == 0 => {
+            "`--fail-on recurring` needs replays, and the run has `--replays 0`: begin one with `--replays 20`"
+        }
+        () if fail_on.contains(&FailOn::Breach) && space.requirements.is_empty() => {
+            "`--fail-on breach` needs a requirement, and the space has none: add `use \"law.ava\"`, or a `require`"
+        }
+        () if fail_on.contains(&FailOn::Stalled) && space.episode.stalled_steps.is_none() => {
+            "`--fail-on stalled` needs episodes that stop so: write `stop: arrived or stalled >= 4` in `episode`"
+        }
+        () => return Ok(()),
+    };
+    Err(Failure::usage(why))
 }
 
 /// The failure of a run of which the user asked to fail on something that was found.
@@ -125,8 +133,8 @@ fn failed_on(found: &Totals, fail_on: &[FailOn]) -> Result<(), Failure> {
     if fail_on.contains(&FailOn::Recurring) && found.recurring > 0 {
         return Err(Failure::Recurring { findings: found.recurring as usize });
     }
-    if fail_on.contains(&FailOn::Stalled) && found.stalled > 0 {
-        return Err(Failure::Stalled { episodes: found.stalled as usize });
+    if fail_on.contains(&FailOn::Stalled) && found.stuck > 0 {
+        return Err(Failure::Stalled { episodes: found.stuck as usize });
     }
     // If no episode was driven to its end, nothing was tested, so the command fails without `--fail-on`, too.
     if found.failed > 0 && (!fail_on.is_empty() || found.failed == found.episodes) {
@@ -189,10 +197,10 @@ fn play_all(
     if !refusals.is_empty() {
         output.say(&refusals_text(&refusals));
     }
-    if totals.stalled * 2 > totals.episodes {
+    if totals.stuck * 2 > totals.episodes {
         output.warn(&format!(
             "the ego vehicle got stuck in {} of {}: what does not drive avoids every collision",
-            totals.stalled,
+            totals.stuck,
             plural(totals.episodes as usize, "episode")
         ));
     }
@@ -239,7 +247,8 @@ fn play_all(
             directory.path.shown()
         ));
     }
-    if is_over {
+    // A protocol is complete, and failures say themselves what to do.
+    if is_over && (!critical.is_empty() || !kept.is_empty() || !is_protocol && totals.failed == 0) {
         output.say(&next_text(&directory.path, &critical, &kept));
     }
     let failures = directory.read(Database::failures)?;
@@ -269,6 +278,7 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<Begun>, Fai
         (None, None) => compile::last(output)?,
     };
     let space = table.space();
+    can_fail_on(&arguments.fail_on, space, arguments.replays)?;
     let shard = shard::asked(output, arguments.shard.shard)?;
     let agent = policy.as_ref().map_or(&arguments.conditions.agent, |(_, policy)| &policy.name);
     let under_test = load::named(&arguments.under_test.ads)?;
@@ -676,7 +686,7 @@ pub fn next_text(directory: &Path, critical: &[PathBuf], kept: &[PathBuf]) -> St
             for_shell(first)
         ),
         (None, [_, ..]) => format!("next: avastra report {directory} makes a page to watch them"),
-        (None, []) => "next: more episodes (`--episodes`), ordinary traffic (`--ambient 6`) or other\n      roads may find more".to_owned(),
+        (None, []) => "next: more episodes (`--episodes`), ordinary traffic (`--ambient`) or other\n      roads may find more".to_owned(),
     }
 }
 

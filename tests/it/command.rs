@@ -338,3 +338,74 @@ fn formatting_is_as_reviewed_and_changes_nothing_twice() {
         once.1
     });
 }
+
+/// `use "law.ava"` finds the file within the program where none lies, and only by its bare name.
+#[test]
+fn the_law_can_be_used_from_any_folder() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    done_in(scratch.path(), &["new", "town"]);
+    let write = |name: &str, text: &str| {
+        std::fs::write(scratch.path().join(name), text).expect("it is writable");
+    };
+    let check = |name: &str| outcome(avastra(&["check", name]).current_dir(scratch.path()));
+    write("town/legal.ava", "language 1\nuse \"space.ava\"\nuse \"law.ava\"\nuse \"comfort.ava\"\n");
+    assert_eq!(check("town/legal.ava").0, 0);
+    // A folder that can be moved has its own copy.
+    done_in(scratch.path(), &["export", "--to", "ava", "town/legal.ava", "--out", "moved"]);
+    let copied = std::fs::read_to_string(scratch.path().join("moved/space/law.ava")).expect("it was copied");
+    assert!(copied.contains("require stops_at_red"), "{copied}");
+    // Another path is a mistake, and so is a link that leads nowhere. An own file goes first.
+    write("town/astray.ava", "language 1\nuse \"space.ava\"\nuse \"../law.ava\"\n");
+    assert!(check("town/astray.ava").2.contains("AV0106"));
+    let link = scratch.path().join("town/law.ava");
+    std::os::unix::fs::symlink("nowhere.ava", &link).expect("links can be made");
+    assert!(check("town/legal.ava").2.contains("AV0106"));
+    std::fs::remove_file(&link).expect("it is there");
+    write("town/law.ava", "language 1\nrequire own: ego.speed <= 1 m/s\n");
+    let table = done_in(scratch.path(), &["check", "--audit", "town/legal.ava", "--format", "json"]);
+    assert!(table.contains("own") && !table.contains("stops_at_red"), "{table}");
+}
+
+#[test]
+fn a_run_fails_on_what_is_asked_for() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let run = |name: &str, more: &[&str]| {
+        let out = scratch.path().join(name).display().to_string();
+        let wanted = ["run", "scenarios/avastra45.ava", "--out", &out, "--quiet"];
+        let (status, _, stderr) = outcome(&mut avastra(&[&wanted, more].concat()));
+        (status, stderr)
+    };
+    let truck_blind = "scenarios/ads/faults/perception_blind_to_large_vehicles.yaml";
+    let some = ["--ads", truck_blind, "--road", "corner", "--episodes", "50", "--fail-on", "recurring,stalled"];
+    let (status, told) = run("recurring", &some);
+    assert!(status == 4 && told.contains(" under other noise"), "{status}: {told}");
+    // Some of those stalled after a crash, which does not count as such. Here one got stuck by itself.
+    let stuck = ["--ads", FLICKER, "--road", "crossroad", "--episodes", "25", "--replays", "0"];
+    let (status, told) = run("stalled", &[&stuck[..], &["--fail-on", "stalled"]].concat());
+    assert!(status == 4 && told.contains("got stuck in 1 episode"), "{status}: {told}");
+    // Nothing is begun that cannot be judged so.
+    for (more, reason) in [
+        (&["--replays", "0", "--fail-on", "recurring"][..], "needs replays"),
+        (&["--fail-on", "breach"], "needs a requirement"),
+    ] {
+        let (status, told) = run("none", more);
+        assert!(status == 1 && told.contains(reason), "{status}: {told}");
+        assert!(!scratch.path().join("none").exists());
+    }
+}
+
+#[test]
+fn the_version_names_all_that_others_depend_on() {
+    let told = done(&["--version"]);
+    for part in [
+        "language 1",
+        "engine plane/",
+        "protocol avastra-ads/",
+        "JSON schema ",
+        "run.db ",
+        "study.db ",
+        "estimate.db ",
+    ] {
+        assert!(told.contains(part), "{told}");
+    }
+}

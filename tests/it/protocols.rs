@@ -68,13 +68,14 @@ fn each_row_is_played_once_whoever_plays_it() {
 fn a_protocol_outlives_its_driving_system() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let space = space(scratch.path());
+    // All of these fail in each episode.
     for how in ["nan", "crash-in-episode", "error", "close-stdout"] {
         let out = scratch.path().join(how).display().to_string();
         let toy =
             format!("'{}' ads toy --misbehave {how}", assert_cmd::cargo::cargo_bin("avastra").display());
         let run = ["run", &space, "--agent", "every-row", "--replays", "0", "--ads", &toy, "--out", &out];
         let (status, stdout, stderr) = outcome(&mut avastra(&run));
-        assert!(status == 0 || status == 5, "{how}: {status} {stderr}");
+        assert_eq!(status, 5, "{how}: {stderr}");
         assert!(stdout.contains("driving system failed"), "{how}: {stdout}");
         done(&["report", &out]);
         let page = read(Path::new(&out), "report.html");

@@ -171,6 +171,34 @@ test("a plan has the points of its thought", () => {
   assert.deepEqual(of.plan(9), [], "after the last thought there is none");
 });
 
+test("a replay is opened for its event: a collision, a breach, a failure, what came near, a manoeuvre, an action", () => {
+  const { recording: of } = recording();
+  const { header } = of;
+  header.summary = { breaches: [], failure: null, duration_s: 9 };
+  header.collisions[1].obstacle = 1;
+  assert.deepEqual(of.event(), { at_s: 0.04, what: "contact", obstacle: 1 });
+  header.collisions = [];
+  header.summary.breaches = [{ requirement: "gap", at_s: 0.03, obstacle: null }];
+  assert.deepEqual(of.event(), { at_s: 0.03, what: "breach of gap", obstacle: null });
+  header.summary.breaches = [];
+  header.summary.failure = "it died";
+  assert.deepEqual(of.event(), { at_s: 9, what: "the driving system fails", obstacle: null });
+  header.summary.failure = null;
+  // 5 m apart at tick 1, less half of both lengths.
+  header.obstacles[0].length_m = 2;
+  assert.deepEqual(of.event(), { at_s: 0.02, what: "nearest approach", obstacle: 1 });
+  assert.ok(Math.abs(of.nearest().distance_m - 0.65) < 1e-9, `${of.nearest().distance_m}`);
+  // Far away, the beginning of a phase counts; its times are seconds.
+  of.columns[4] = Float64Array.from([500, 700]);
+  header.obstacles[0].phases = [[12.5, "cut_in"], [14, "brakes"]];
+  assert.deepEqual(of.event(), { at_s: 12.5, what: "a manoeuvre begins", obstacle: 1 });
+  delete header.obstacles[0].phases;
+  header.steps = [{ at_s: 0, outcome: { kind: "passed" } }, { at_s: 6, outcome: { kind: "done" } }];
+  assert.deepEqual(of.event(), { at_s: 6, what: "first action", obstacle: null });
+  header.steps = [];
+  assert.equal(of.event(), null);
+});
+
 test("a scenario is about the first collision that counts, or its first breach", () => {
   const { recording: of } = recording();
   assert.equal(of.collision().at_s, 0.04);

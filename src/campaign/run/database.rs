@@ -377,6 +377,7 @@ impl Database {
             "SELECT count(*), coalesce(sum(collisions), 0), coalesce(sum(counted), 0),
                         coalesce(sum(collisions > 0), 0), coalesce(sum(counted > 0), 0),
                         coalesce(sum(ended = 'arrived'), 0), coalesce(sum(ended = 'stalled'), 0),
+                        coalesce(sum(ended = 'stalled' AND collisions = 0), 0),
                         coalesce(sum(ended = 'limit'), 0), coalesce(sum(duration_s), 0.0),
                         coalesce(sum(distance_m), 0.0), coalesce(sum(red_runs), 0), avg(first_counted_s),
                         (SELECT coalesce(sum(sudden), 0) FROM collision),
@@ -407,6 +408,7 @@ impl Database {
                         episodes_with_counted,
                         arrived,
                         stalled,
+                        stuck,
                         step_limit,
                         simulated_s,
                         driven_m,
@@ -502,6 +504,8 @@ pub struct Totals {
     /// Ended without progress: for a reason of the driving system's own, because others blocked its way, and
     /// because it had left its lane.
     pub stalled: i64,
+    /// Stalled without a collision: the driving system stopped by itself.
+    pub stuck: i64,
     pub blocked: i64,
     pub astray: i64,
     /// Ended because the ego vehicle drove off the map.

@@ -454,8 +454,10 @@ impl HeatMap {
                     all.iter().all(|share| share.abs() <= 1.0) && all.iter().any(|share| share.fract() != 0.0)
                 });
             if let Some(numbers) = numbers.filter(|_| is_share) {
-                *labels =
-                    numbers.iter().map(|share| format!("{} %", decimal(share * 100.0, false))).collect();
+                *labels = numbers
+                    .iter()
+                    .map(|share| format!("{} %", decimal((share * 1e6).round() / 1e4, false)))
+                    .collect();
             }
         }
         self

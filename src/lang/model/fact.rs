@@ -243,7 +243,7 @@ facts! {
     EgoOffset "ego.offset" LENGTH, World, moment.ego_offset_m =
         "`Length`: lateral offset from the route, positive to the left.";
     EgoFront "ego.front" LENGTH, World, moment.ego_front_m =
-        "`Length`: station of its front on the route. The route begins at 0 m, under its rear axle at the start.";
+        "`Length`: station of the ego vehicle's front on the route. The route begins at 0 m, under its rear axle at the start.";
     EgoRear "ego.rear" LENGTH, World, moment.ego_rear_m =
         "`Length`: station of its rear on the route. It is 4.70 m long and 2.06 m wide.";
     RoadUsers "road_users" Type::Int, World, moment.road_users in Users =
@@ -259,7 +259,7 @@ facts! {
     StepNumber "step" Type::Int, World, world.step =
         "`Int`: number of the step, from 0.", FROM_0;
     NpcSpeed "npc.speed" SPEED, Spawn, npc.speed_mps =
-        "`Speed`: speed.", FROM_0;
+        "`Speed`: speed of the road user.", FROM_0;
     NpcAcceleration "npc.acceleration" ACCEL, Spawn, npc.acceleration_mps2 =
         "`Accel`: acceleration along its heading, over the last 0.02 s. Below 0 it brakes; 0 as it appears.";
     NpcGap "npc.gap" LENGTH, Spawn, npc.gap_m =
@@ -329,13 +329,13 @@ facts! {
     EgoLeadSince "ego.lead_since" DURATION, Tick, tick.lead_since_s in Lead =
         "`Duration`: for how long it has been that one. A cut-in starts this time anew. 0 without one.", FROM_0;
     EgoOverRed "ego.over_red" LENGTH, Tick, tick.over_red_m in OverRed =
-        "`Length`: how far its front is beyond the stop line of a light that was red as it passed: up to 30 m, and while the light stays red.";
+        "`Length`: how far its front is beyond the stop line of a light that was red as it passed: up to 30 m, and while the light stays red. Before a red light: minus the distance to its line, at least -100 m.";
     EgoOverStop "ego.over_stop" LENGTH, Tick, tick.over_stop_m in OverStop =
-        "`Length`: how far its front is beyond the line of a stop sign, until its rear has passed it.";
+        "`Length`: how far its front is beyond the line of a stop sign, until its rear has passed it. Before it: minus the distance to it, at least -100 m.";
     EgoOverLine "ego.over_line" LENGTH, Tick, tick.over_line_m in OverLine =
-        "`Length`: how far its front is beyond the stop line of a traffic light of any colour, until its rear has passed it.";
+        "`Length`: how far its front is beyond the stop line of a traffic light of any colour, until its rear has passed it. Before it: minus the distance to it, at least -100 m.";
     EgoOverCrosswalk "ego.over_crosswalk" LENGTH, Tick, tick.over_crosswalk_m in OverCrosswalk =
-        "`Length`: how far its front is beyond the near edge of a crosswalk on the route, until its rear has passed the far edge.";
+        "`Length`: how far its front is beyond the near edge of a crosswalk on the route, until its rear has passed the far edge. Before it: minus the distance to it, at least -100 m.";
     EgoLaneOffset "ego.lane_offset" LENGTH, Tick, tick.lane_offset_m in Lane =
         "`Length`: how far its rear axle is to the left of the middle of its route's lane. `ego.offset` is from the route, also while the route changes lanes.";
     EgoOverOncoming "ego.over_oncoming" LENGTH, Tick, tick.over_oncoming_m in OverOncoming =

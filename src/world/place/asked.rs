@@ -72,7 +72,7 @@ pub fn finish(asked: &Asked, motion: Motion, moved: Moved) -> Result<RoadUser, S
                 .obstacles()
                 .find(is_it)
                 .map_or_else(|| "another road user".to_owned(), |obstacle| format!("npc#{}", obstacle.id));
-            Err(format!("{who} is there, or nearer than {room_m:.1} m"))
+            Err(format!("{who} is nearer than {room_m:.1} m"))
         }
     }
 }

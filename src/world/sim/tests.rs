@@ -134,7 +134,7 @@ fn refusals_say_why() {
     let crossing = request(Verb::CrossRoad, 12.0, 10.0);
     assert_eq!(refused(&world, crossing), "no crossing leg from the right within 60 m");
     spawn(&mut world, request(Verb::Stand, 40.0, 1.0));
-    assert_eq!(refused(&world, request(Verb::Stand, 40.2, 1.0)), "npc#1 is there, or nearer than 0.5 m");
+    assert_eq!(refused(&world, request(Verb::Stand, 40.2, 1.0)), "npc#1 is nearer than 0.5 m");
     let driver = request(Verb::DriveAhead, 30.0, 20.0);
     let said = refused(&world, driver);
     assert!(said.starts_with("npc#1 is too near ahead in its lane: "), "{said}");

@@ -4,7 +4,7 @@
 export type Column = number;
 /** Columns of x (m), y (m) and heading (rad). */
 export type Places = [Column, Column, Column];
-/** From a tick or a time (s) on: what. */
+/** From a tick or a time (s) on: what. Lights and signals go by ticks; `held`, `skies` and `phases` by seconds. */
 export type Changes<T> = [number, T][];
 /** How much a reason holds the speed back: it brakes hard, comes to a stop, follows somebody, or drives freely. */
 export type Restraint = "hard" | "stops" | "follows" | "free";

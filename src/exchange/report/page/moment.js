@@ -278,9 +278,9 @@ export class Recording {
     if (nearest && nearest.distance_m <= NEAR_M) {
       return { at_s: nearest.at_s, what: "nearest approach", obstacle: nearest.obstacle };
     }
-    const begins = this.header.obstacles.flatMap(({ id, phases }) => (phases ?? []).map(([tick]) => ({ tick, id })));
-    const [first] = begins.sort((a, b) => a.tick - b.tick);
-    if (first) return { at_s: first.tick * this.tickS, what: "a manoeuvre begins", obstacle: first.id };
+    const begins = this.header.obstacles.flatMap(({ id, phases }) => (phases ?? []).map(([atS]) => ({ atS, id })));
+    const [first] = begins.sort((a, b) => a.atS - b.atS);
+    if (first) return { at_s: first.atS, what: "a manoeuvre begins", obstacle: first.id };
     const done = this.header.steps.find(({ outcome }) => outcome.kind === "done");
     return done ? { at_s: done.at_s, what: "first action", obstacle: null } : null;
   }

@@ -164,8 +164,7 @@ function totals({ totals: sums, simulated_h: simulatedH, requirements, mixed }) 
       tile(figure(sums.driven_m / 1000, "km", 1), "driven"),
       tile(simulated(simulatedH), "of simulated time"),
       tile(sums.red_runs, "red lights passed", sums.red_runs > 0 ? "bad" : ""),
-      sums.stalled > 0 &&
-        tile(sums.stalled, "episodes in which it got stuck", 2 * sums.stalled > sums.episodes ? "bad" : ""),
+      sums.stuck > 0 && tile(sums.stuck, "episodes in which it got stuck", 2 * sums.stuck > sums.episodes ? "bad" : ""),
     ),
     el(
       "p",
