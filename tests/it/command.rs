@@ -376,7 +376,8 @@ fn a_run_fails_on_what_is_asked_for() {
         (status, stderr)
     };
     let truck_blind = "scenarios/ads/faults/perception_blind_to_large_vehicles.yaml";
-    let some = ["--ads", truck_blind, "--road", "corner", "--episodes", "50", "--fail-on", "recurring,stalled"];
+    let some =
+        ["--ads", truck_blind, "--road", "corner", "--episodes", "50", "--fail-on", "recurring,stalled"];
     let (status, told) = run("recurring", &some);
     assert!(status == 4 && told.contains(" under other noise"), "{status}: {told}");
     // Some of those stalled after a crash, which does not count as such. Here one got stuck by itself.
