@@ -17,9 +17,12 @@
 //! ```
 
 pub mod outside;
+mod folded;
 pub mod threads;
 pub mod units;
 pub mod rng;
 pub mod statistics;
 pub mod geometry;
 pub mod kinematics;
+
+pub use folded::folded;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use avastra_base::outside::Shown;
+use avastra_campaign::estimate::EstimateError;
 use avastra_campaign::run::RunError;
 
 /// Every way in which a command can fail.
@@ -19,18 +20,9 @@ pub enum Failure {
     Unformatted { files: usize },
     #[error("{count} refuted", count = super::output::plural(*claims, "claim"))]
     Refuted { claims: usize },
-    #[error("{count} found{recurring}", count = super::output::plural(*collisions, "counted collision"))]
-    Collision {
-        collisions: usize,
-        /// How many of them recur, in words, if that was tried.
-        recurring: String,
-    },
-    #[error("requirements were breached in {count}", count = super::output::plural(*episodes, "episode"))]
-    Breach { episodes: usize },
-    #[error("{count} under other noise", count = recurring(*findings))]
-    Recurring { findings: usize },
-    #[error("the ego vehicle got stuck in {count}", count = super::output::plural(*episodes, "episode"))]
-    Stalled { episodes: usize },
+    /// What the user asked a run to fail on.
+    #[error("{what}")]
+    Found { what: String },
     /// The external driving system is not the one that the campaign was begun with.
     #[error("{message}")]
     OtherProgram { message: String },
@@ -78,11 +70,7 @@ impl Failure {
             | Failure::OtherProgram { .. }
             | Failure::NotPlayed { in_source: true, .. } => 2,
             Failure::Refuted { .. } => 3,
-            Failure::Collision { .. }
-            | Failure::Breach { .. }
-            | Failure::Recurring { .. }
-            | Failure::Stalled { .. }
-            | Failure::Failing { .. } => 4,
+            Failure::Found { .. } | Failure::Failing { .. } => 4,
             Failure::Ads { .. } | Failure::Unreached { .. } => 5,
             // A shell reports this status for a process that SIGINT ended.
             Failure::Stopped | Failure::Interrupted { .. } => 130,
@@ -90,19 +78,19 @@ impl Failure {
     }
 }
 
-/// How many findings recur, in words.
-fn recurring(findings: usize) -> String {
-    format!(
-        "{} {}",
-        super::output::plural(findings, "finding"),
-        if findings == 1 { "recurs" } else { "recur" }
-    )
-}
-
 impl From<RunError> for Failure {
     fn from(error: RunError) -> Failure {
         match error {
             RunError::OtherProgram { .. } => Failure::OtherProgram { message: error.to_string() },
+            _ => Failure::usage(error),
+        }
+    }
+}
+
+impl From<EstimateError> for Failure {
+    fn from(error: EstimateError) -> Failure {
+        match error {
+            EstimateError::Run(error) => error.into(),
             _ => Failure::usage(error),
         }
     }

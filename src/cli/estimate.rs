@@ -7,9 +7,9 @@ use std::sync::atomic::AtomicBool;
 use avastra_base::outside::Shown;
 use avastra_base::statistics::Interval;
 use avastra_campaign::estimate::{
-    Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateError, EstimateResults,
-    EstimateSettings, EventKind, FRAME, Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played,
-    Probability, Stopping, compared, pilot, play_parts,
+    Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
+    FRAME, Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, compared,
+    pilot, play_parts,
 };
 use avastra_campaign::run::{DatabaseError, Run, RunError, RunSettings, Shard, Units};
 use avastra_world::action::ActionTable;
@@ -380,20 +380,13 @@ fn wanted(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, S
         run: conditions::settings(table.space(), conditions, &conditions.agent, under_test, episodes)?,
     };
     let settings = settings.started_unless(arguments.shard.dry_run);
-    Ok((Estimate::new(table, settings).map_err(failed)?, shard))
-}
-
-fn failed(error: EstimateError) -> Failure {
-    match error {
-        EstimateError::Run(error) => error.into(),
-        _ => Failure::usage(error),
-    }
+    Ok((Estimate::new(table, settings)?, shard))
 }
 
 /// The rest of an interrupted estimate. With `is_played`, nothing of it is left to play, and no program is started.
 fn resumed(output: &Output, path: &Path, is_played: bool) -> Result<(Estimate, Directory), Failure> {
     let Resumed { settings, text, table, held } = run_directory::resume(output, path, is_played)?;
-    let estimate = Estimate::new(table, settings).map_err(failed)?;
+    let estimate = Estimate::new(table, settings)?;
     Ok((estimate, Directory::open_to_go_on(output, held, &text)?))
 }
 

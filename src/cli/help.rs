@@ -7,6 +7,7 @@ use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 use clap::error::Error;
 use clap::{Arg, Command, CommandFactory};
 
+use avastra_base::folded;
 use avastra_drivers as ads;
 use avastra_drivers::external::PROTOCOL;
 use avastra_lang::syntax::LANGUAGE;
@@ -14,7 +15,7 @@ use avastra_search::agent::{self, Kind};
 use avastra_world::sim::{ENGINE, TrafficProfile};
 
 use super::arguments::Arguments;
-use super::output::{COLUMNS, SCHEMA, folded};
+use super::output::{COLUMNS, SCHEMA};
 
 const STATUS: &str = "\
 Exit status:

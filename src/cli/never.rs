@@ -3,10 +3,11 @@
 
 use std::collections::BTreeMap;
 
+use avastra_base::folded;
 use avastra_campaign::run::RowCount;
 use avastra_world::action::ActionTable;
 
-use super::output::{COLUMNS, folded, plural};
+use super::output::{COLUMNS, plural};
 
 /// Reasons that are listed, those of most rows; `--verbose` lists every row.
 const REASONS_MAX: usize = 4;

@@ -141,15 +141,15 @@ fn example(name: &str) -> Vec<(String, String)> {
     files
 }
 
-/// The limit of the space to begin with.
-const STARTER_LIMIT: &str = "limit: 20 steps";
+/// The limit of the space to begin with, in steps.
+const STARTER_STEPS: u32 = 20;
 /// Its step, s, and a mean speed at which a driving system arrives that waits at lights and for others, m/s. Ours.
 const STARTER_STEP_S: f64 = 6.0;
 const ARRIVES_MPS: f64 = 5.0;
 
 /// Steps in which a driving system arrives, at least those of the space to begin with.
 fn steps_for(length_m: f64) -> u32 {
-    ((length_m / (ARRIVES_MPS * STARTER_STEP_S)).ceil() as u32).max(20)
+    ((length_m / (ARRIVES_MPS * STARTER_STEP_S)).ceil() as u32).max(STARTER_STEPS)
 }
 
 /// The space to begin with, on proposed routes of a map, with the map.
@@ -183,7 +183,8 @@ fn on_map(output: &Output, path: &Path) -> Result<Vec<(String, String)>, Failure
     let routes = proposals.iter().filter_map(|way| Route::find(&map, way.start, way.goal).ok());
     let longest_m = routes.map(|route| route.path.length_m()).fold(0.0, f64::max);
     let space = STARTER[0].1.replace("roads: [corner]", &format!("roads: [{}]", names.join(", ")));
-    assert!(space.contains(STARTER_LIMIT), "the space to begin with has its limit");
-    let space = space.replace(STARTER_LIMIT, &format!("limit: {} steps", steps_for(longest_m)));
+    let limit = |steps: u32| format!("limit: {steps} steps");
+    assert!(space.contains(&limit(STARTER_STEPS)), "the space to begin with has its limit");
+    let space = space.replace(&limit(STARTER_STEPS), &limit(steps_for(longest_m)));
     Ok(vec![("space.ava".to_owned(), space), ("roads.ava".to_owned(), roads), (file, text)])
 }

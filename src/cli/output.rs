@@ -303,24 +303,6 @@ fn is_on_screen() -> bool {
 /// Columns that every terminal shows in a line; longer text is folded.
 pub const COLUMNS: usize = 80;
 
-/// A text in lines of at most `width` letters, cut between words; at least one line. A longer word stands alone in its
-/// line.
-pub fn folded(text: &str, width: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in text.split_whitespace() {
-        let last = lines.last_mut().expect("there is always a line");
-        if last.is_empty() {
-            last.push_str(word);
-        } else if last.chars().count() + 1 + word.chars().count() <= width {
-            last.push(' ');
-            last.push_str(word);
-        } else {
-            lines.push(word.to_owned());
-        }
-    }
-    lines
-}
-
 /// A path as a shell takes it for one word, for commands that are printed to be copied.
 pub fn for_shell(path: &Path) -> String {
     let text = path.shown().to_string();

@@ -8,7 +8,7 @@ use serde_json::Value;
 use avastra_base::outside::Shown;
 use avastra_campaign::run::{
     Asked, Database, DatabaseError, FoundIn, HeatMap, ProtocolTest, RunSettings, Tally, Units, heat_maps,
-    main_maps, parameters, recorded,
+    main_maps, parameters, recorded, scenario_name,
 };
 use avastra_campaign::study::StudyResults;
 use avastra_campaign::train::TrainSettings;
@@ -289,8 +289,7 @@ fn of_run(
             serde_json::json!({ "text": protocol::counts_text(&tests), "tally": Tally::of(&tests) });
     }
     let groups = database.groups().map_err(unread)?;
-    let name = |road: &str, episode: i64| format!("{road}_{episode:04}");
-    found.examples = groups.iter().map(|group| name(&group.road, group.episode)).collect();
+    found.examples = groups.iter().map(|group| scenario_name(&group.road, group.episode)).collect();
     found.worst = database.found().map_err(unread)?.iter().map(FoundIn::name).collect();
     Ok(remarks)
 }

@@ -89,11 +89,15 @@ impl Cut for RunSettings {
 /// Plays the episodes of a new run, or those that an interrupted one still lacks.
 pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     let begun = match &arguments.resume {
-        Some(path) => Some(resumed(output, path, false)?),
+        Some(path) => {
+            let begun = resumed(output, path, false)?;
+            let (run, _) = &begun.0;
+            can_fail_on(&arguments.fail_on, run.space(), run.settings().replays)?;
+            Some(begun)
+        }
         None => begun(output, arguments)?,
     };
     let Some(((run, directory), elsewhere)) = begun else { return Ok(()) };
-    can_fail_on(&arguments.fail_on, run.space(), run.settings().replays)?;
     output.tell(&format!("{}, into {}", heading(&run), directory.path.shown()));
     conditions::ambient_text(&run).iter().for_each(|text| output.tell(text));
     elsewhere.iter().for_each(|text| output.warn(text));
@@ -120,21 +124,31 @@ fn can_fail_on(fail_on: &[FailOn], space: &Space, replays: u32) -> Result<(), Fa
 
 /// The failure of a run of which the user asked to fail on something that was found.
 fn failed_on(found: &Totals, fail_on: &[FailOn]) -> Result<(), Failure> {
-    if fail_on.contains(&FailOn::Collision) && found.counted > 0 {
-        let recurring = match found.replayed {
-            0 => String::new(),
-            _ => format!(", {} of them recur under other noise", found.counted_recurring),
-        };
-        return Err(Failure::Collision { collisions: found.counted as usize, recurring });
-    }
-    if fail_on.contains(&FailOn::Breach) && found.episodes_with_breach > 0 {
-        return Err(Failure::Breach { episodes: found.episodes_with_breach as usize });
-    }
-    if fail_on.contains(&FailOn::Recurring) && found.recurring > 0 {
-        return Err(Failure::Recurring { findings: found.recurring as usize });
-    }
-    if fail_on.contains(&FailOn::Stalled) && found.stuck > 0 {
-        return Err(Failure::Stalled { episodes: found.stuck as usize });
+    let asks = |what| fail_on.contains(&what);
+    let counted = |count: i64, what: &str| plural(count as usize, what);
+    let what = match () {
+        () if asks(FailOn::Collision) && found.counted > 0 => {
+            let recurring = match found.replayed {
+                0 => String::new(),
+                _ => format!(", {} of them recur under other noise", found.counted_recurring),
+            };
+            Some(format!("{} found{recurring}", counted(found.counted, "counted collision")))
+        }
+        () if asks(FailOn::Breach) && found.episodes_with_breach > 0 => {
+            Some(format!("requirements were breached in {}", counted(found.episodes_with_breach, "episode")))
+        }
+        () if asks(FailOn::Recurring) && found.recurring > 0 => Some(format!(
+            "{} {} under other noise",
+            counted(found.recurring, "finding"),
+            if found.recurring == 1 { "recurs" } else { "recur" }
+        )),
+        () if asks(FailOn::Stalled) && found.stuck > 0 => {
+            Some(format!("the ego vehicle got stuck in {}", counted(found.stuck, "episode")))
+        }
+        () => None,
+    };
+    if let Some(what) = what {
+        return Err(Failure::Found { what });
     }
     // If no episode was driven to its end, nothing was tested, so the command fails without `--fail-on`, too.
     if found.failed > 0 && (!fail_on.is_empty() || found.failed == found.episodes) {
@@ -396,8 +410,8 @@ fn keep(
     directory.write(|database| database.add(summary, log, table.space(), in_words, scenario.as_deref()))
 }
 
-/// Writes the episodes without a finding that are to be kept; `is_empty`: the run found nothing. An attached driving system that cannot be started drives none of
-/// them again.
+/// Writes the episodes without a finding that are to be kept. `is_empty`: the run found nothing.
+/// An attached driving system that cannot be started drives none of them again.
 fn keep_near(run: &Run, directory: &Directory, is_empty: bool) -> Result<Vec<PathBuf>, Failure> {
     let RunSettings { agent, conditions, keep, .. } = run.settings();
     // Unasked, a program of the user's own is not driven again.

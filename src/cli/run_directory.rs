@@ -18,6 +18,7 @@ use avastra_campaign::files::{self, Lock};
 use avastra_campaign::oracle::Found;
 use avastra_campaign::run::{
     self, Conditions, DatabaseError, EpisodeSummary, Near, Numbered, Shard, Units, VERSION, WrittenScenario,
+    scenario_name,
 };
 use avastra_drivers::external::{Attached, ExternalSettings};
 use avastra_lang::check::normal;
@@ -579,7 +580,7 @@ impl<C: Campaign> Directory<C> {
         if !failure.stderr.is_empty() {
             text.push_str(&format!("\nthe end of its standard error:\n{}", failure.stderr));
         }
-        let path = folder.join(format!("{}_{:04}.ava", log.road, summary.episode));
+        let path = folder.join(format!("{}.ava", scenario_name(&log.road, summary.episode as i64)));
         let file = player.file(&path, summary.episode, &|source| {
             emit::whole(player.table, log, &failure.in_words(), source)
         })?;
@@ -596,7 +597,8 @@ impl<C: Campaign> Directory<C> {
         near: &Near,
         log: &EpisodeLog,
     ) -> Result<PathBuf, Failure> {
-        let path = folder(&self.path, KEPT)?.join(format!("{}_{episode:04}.ava", log.road));
+        let path =
+            folder(&self.path, KEPT)?.join(format!("{}.ava", scenario_name(&log.road, episode as i64)));
         if path.exists() {
             return Ok(path);
         }
@@ -611,7 +613,7 @@ impl<C: Campaign> Directory<C> {
     /// Writes the counted collisions of an episode as a scenario, `critical/ROAD_NNNN.ava`, and gives the text of the
     /// file.
     pub fn write_critical(&self, player: &Player, (log, summary): Judged) -> Result<String, Failure> {
-        let name = format!("{}_{:04}.ava", log.road, summary.episode);
+        let name = format!("{}.ava", scenario_name(&log.road, summary.episode as i64));
         let found = summary.first_found(log).expect("a critical episode has a finding");
         player.write_scenario(&self.path.join("critical").join(name), (log, summary), found)
     }

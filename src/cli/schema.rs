@@ -3,7 +3,7 @@
 //! It is a table and no derived schema, because most of it is the meaning of fields. A result is made by `json!` where it
 //! arises, and has no type to derive from. `tests/it/json.rs` compares the table with the commands' output, both ways.
 
-use super::output::folded;
+use avastra_base::folded;
 
 /// A field of a result.
 #[derive(Debug, serde::Serialize)]

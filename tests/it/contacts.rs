@@ -14,7 +14,7 @@ use avastra::sim::{Contact, DT_S, Obstacle, World};
 
 use crate::world::{run, under};
 
-const CASES: u64 = 3_000;
+const CASES: u64 = 10_000;
 /// Length of a case, ticks.
 const TICKS: usize = 10;
 /// Steps of the twin, s, and how many make a tick.
@@ -282,7 +282,7 @@ fn case(kind: Kind, rng: &mut Rng) -> Case {
 }
 
 #[test]
-fn three_thousand_first_contacts_are_the_twins() {
+fn ten_thousand_first_contacts_are_the_twins() {
     let (mut touching, mut grazing, mut missing) = (0, 0, 0);
     let mut worst_s = 0.0_f64;
     for number in 0..CASES {

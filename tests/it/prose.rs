@@ -52,18 +52,21 @@ fn sentences(text: &str) -> Vec<usize> {
 fn the_pages_for_users_have_short_sentences() {
     let mut pages = files_below(root().join("docs"), "md");
     pages.push(root().join("README.md"));
-    let (mut all, mut long) = (0, 0);
     for path in pages {
         let name = path.strip_prefix(root()).expect("it lies there").display();
         let page = std::fs::read_to_string(&path).expect("it is there");
+        let (mut all, mut long) = (0, 0);
         for (line, text) in paragraphs(&page) {
             for words in sentences(&text) {
                 assert!(words <= WORDS_MAX, "{name}:{line}: a sentence has {words} words: {text}");
                 (all, long) = (all + 1, long + usize::from(words > LONG));
             }
         }
+        assert!(
+            100 * long <= LONG_PERCENT * all,
+            "{name}: {long} of {all} sentences have more than {LONG} words"
+        );
     }
-    assert!(100 * long <= LONG_PERCENT * all, "{long} of {all} sentences have more than {LONG} words");
 }
 
 #[test]

@@ -18,6 +18,7 @@ use avastra_lang::model::{Memory, RequirementDef, Space, StateMeaning, Value};
 use avastra_search::mdp::STATE_LEN;
 use avastra_world::action::Draw;
 
+use crate::run::findings::scenario_name;
 use crate::run::offered::{RowCount, without_figures};
 use crate::run::sealed::{DatabaseError, Layout, insert_row, of_columns, query_all};
 use crate::run::settled::{Units, WrittenScenario};
@@ -299,7 +300,7 @@ impl Database {
                 problem: row.get(1)?,
                 times: row.get(2)?,
                 detail: format!("at {stage}, {detail}{exit}"),
-                scenario: format!("{road}_{episode:04}"),
+                scenario: scenario_name(&road, episode),
             })
         })
     }
@@ -335,7 +336,7 @@ impl Database {
              ORDER BY 7 DESC, margin.requirement";
         let named = |at: Option<String>| {
             let (road, episode) = at.as_deref().and_then(|at| at.split_once('/'))?;
-            Some(format!("{road}_{:04}", episode.parse::<i64>().ok()?))
+            Some(scenario_name(road, episode.parse().ok()?))
         };
         query_all(&self.connection, query, |row| {
             let (episode, road): (i64, String) = (row.get(4)?, row.get(5)?);
@@ -345,7 +346,7 @@ impl Database {
                 unit: row.get(1)?,
                 episodes: row.get(2)?,
                 smallest,
-                nearest: smallest.map(|_| format!("{road}_{episode:04}")),
+                nearest: smallest.map(|_| scenario_name(&road, episode)),
                 breaches: row.get(6)?,
                 breached_in: row.get(7)?,
                 kept_in: row.get(8)?,

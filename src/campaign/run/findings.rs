@@ -28,10 +28,15 @@ pub struct FoundIn {
     pub harm_share: f64,
 }
 
+/// The name of the scenario that an episode becomes, and of its file.
+pub fn scenario_name(road: &str, episode: i64) -> String {
+    format!("{road}_{episode:04}")
+}
+
 impl FoundIn {
     /// The name of its scenario.
     pub fn name(&self) -> String {
-        format!("{}_{:04}", self.road, self.episode)
+        scenario_name(&self.road, self.episode)
     }
 
     /// In the terminal's list of scenarios: whose recurrence it is, and how bad it is.

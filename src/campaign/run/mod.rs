@@ -32,7 +32,7 @@ pub use columns::{Column, Values, columns};
 pub use coverage::{CoverageCell, LearningPoint};
 pub use database::{Database, FailureCount, RefusalCount, RequirementCount, Totals};
 pub(crate) use database::{LAYOUT, add_all};
-pub use findings::{FoundIn, Near};
+pub use findings::{FoundIn, Near, scenario_name};
 pub use gauges::Gauges;
 pub(crate) use groups::PEDESTRIAN;
 pub use groups::{Group, kind};

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::run::database::Database;
+use crate::run::findings::scenario_name;
 use crate::run::sealed::{DatabaseError, query_all};
 use avastra_base::units::{Dimension, decimal};
 use avastra_lang::model::{Space, Type};
@@ -345,7 +346,7 @@ impl Tally {
             }
             tally.breached += u32::from(!test.breached.is_empty());
             if test.ending != Some(Ending::Avoided) || !test.breached.is_empty() {
-                tally.scenarios.push(format!("{}_{:04}", test.road, test.episode));
+                tally.scenarios.push(scenario_name(&test.road, test.episode));
             }
             relatives.extend(test.relative_mps);
             impacts.extend(test.impact_mps);

@@ -101,7 +101,8 @@ pub struct RunArguments {
     #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "replays", "keep", "out", "self_contained", "shard", "dry_run", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if this was found: `recurring` (a counted collision or a breach that recurs), `collision` (any that
-    /// counts), `breach` (any), `stalled` (an episode that stalled without a collision). With it, a failure of a driving system of your own in any episode exits with status 5.
+    /// counts), `breach` (any), `stalled` (an episode that stalled without a collision). With it, a failure of a
+    /// driving system of your own in any episode exits with status 5.
     #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',')]
     pub fail_on: Vec<FailOn>,
 }

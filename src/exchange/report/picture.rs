@@ -8,6 +8,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
+use avastra_base::folded;
 use avastra_base::geometry::{Bounds, OrientedBox, Vec2};
 use avastra_base::kinematics::STANDING_MPS;
 use avastra_base::outside::in_markup;
@@ -102,23 +103,6 @@ pub fn picture(moments: &[Snapshot], subject: &Subject) -> String {
     write_text(&mut svg, (6.0, height_px - 8.0), r##"font-size="12" fill="#5a6372""##, legend);
     svg.push_str("</svg>\n");
     svg
-}
-
-/// A text in lines of at most so many letters, broken between words.
-fn folded(text: &str, letters: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in text.split_whitespace() {
-        let line = lines.last_mut().expect("there is one");
-        if line.is_empty() {
-            line.push_str(word);
-        } else if line.chars().count() + 1 + word.chars().count() <= letters {
-            line.push(' ');
-            line.push_str(word);
-        } else {
-            lines.push(word.to_owned());
-        }
-    }
-    lines
 }
 
 /// Draws in world coordinates around what matters.

@@ -212,21 +212,18 @@ fn played(
 }
 
 /// A longer profile is not printed.
-const PROFILE_LETTERS_MAX: usize = 60;
+const PROFILE_BYTES_MAX: usize = 60;
 
 /// Where a scenario comes from: name and text of each.
 fn origin(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Vec<(&'static str, String)> {
     let origin = &scenario.origin;
     let space = table.space().path.file_name().map(|name| name.to_string_lossy().into_owned());
-    let driver = match &origin.profile {
-        // A long one stands in the source, which the page shows.
-        Some(profile)
-            if origin.ads.as_deref() == Some(ads.name()) && profile.len() <= PROFILE_LETTERS_MAX =>
-        {
-            format!("{} {profile}", ads.name())
-        }
-        Some(_) if origin.ads.as_deref() == Some(ads.name()) => format!("{}, with its profile", ads.name()),
-        _ => ads.name().to_owned(),
+    let is_its = origin.ads.as_deref() == Some(ads.name());
+    let driver = match origin.profile.as_ref().filter(|_| is_its) {
+        None => ads.name().to_owned(),
+        Some(profile) if profile.len() <= PROFILE_BYTES_MAX => format!("{} {profile}", ads.name()),
+        // The page shows the source, in which it stands.
+        Some(_) => format!("{}, with its profile", ads.name()),
     };
     let known = [
         ("space", space),

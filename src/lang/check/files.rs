@@ -10,13 +10,17 @@ use crate::syntax::ast::Span;
 #[error("{reason}")]
 pub struct ReadError {
     reason: String,
-    /// Whether nothing is there.
-    pub is_missing: bool,
+    is_missing: bool,
 }
 
 impl ReadError {
     pub fn new(reason: impl Into<String>) -> ReadError {
         ReadError { reason: reason.into(), is_missing: false }
+    }
+
+    /// Whether nothing is there.
+    pub fn is_missing(&self) -> bool {
+        self.is_missing
     }
 
     /// The error of a path at which nothing is.

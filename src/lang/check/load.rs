@@ -375,7 +375,7 @@ impl<'a> Loader<'a> {
     /// Reads a file that another one uses. A file that avastra has within itself need not be there.
     fn read_used(&mut self, written: &str, path: &Path, way: &mut Vec<PathBuf>) -> Result<(), ReadError> {
         let done = self.read_file(path, way);
-        let is_missing = done.as_ref().is_err_and(|error| error.is_missing);
+        let is_missing = done.as_ref().is_err_and(ReadError::is_missing);
         match built_in(written).filter(|_| is_missing) {
             Some(text) => self.add_file(path, text.to_owned(), None, way),
             None => done,

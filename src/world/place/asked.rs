@@ -11,7 +11,7 @@ use crate::scene::way::Way;
 use crate::state::change::PlannedChange;
 use crate::state::driver::{Cruise, Driver};
 use crate::state::ego::VehicleParameters;
-use crate::state::obstacle::{Moved, Obstacle};
+use crate::state::obstacle::Moved;
 use crate::state::road_user::{Motion, Mover, RoadUser};
 use crate::view::around::Around;
 use avastra_lang::model::body::BodyParameters;
@@ -65,14 +65,10 @@ pub fn finish(asked: &Asked, motion: Motion, moved: Moved) -> Result<RoadUser, S
             Err("the ego vehicle is there".into())
         }
         Some(other) => {
-            let is_it = |obstacle: &&Obstacle| {
-                core::ptr::eq(&raw const obstacle.outline, core::ptr::from_ref(other.outline))
-            };
-            let who = around
-                .obstacles()
-                .find(is_it)
-                .map_or_else(|| "another road user".to_owned(), |obstacle| format!("npc#{}", obstacle.id));
-            Err(format!("{who} is nearer than {room_m:.1} m"))
+            let mut obstacles = around.obstacles();
+            let it = obstacles.find(|obstacle| core::ptr::eq(&raw const obstacle.outline, other.outline));
+            let it = it.expect("all but the ego vehicle are obstacles");
+            Err(format!("npc#{} is nearer than {room_m:.1} m", it.id))
         }
     }
 }

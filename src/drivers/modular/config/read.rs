@@ -70,31 +70,32 @@ impl ModularConfig {
     /// What differs from the default, as a profile in one line: `{planning: {cruise_mps: 8.0}}`. Empty
     /// for the default itself.
     pub fn to_line(&self) -> String {
-        let own = serde_json::to_value(self).expect("a configuration is plain data");
-        let usual = serde_json::to_value(ModularConfig::default()).expect("a configuration is plain data");
+        let [own, usual] = self.beside_default();
         difference(&own, &usual).unwrap_or_default()
     }
 
     /// What differs from the default, for a heading: the setting if it is one, else how many of which parts. Empty for the
     /// default itself.
     pub fn in_words(&self) -> String {
-        let own = serde_json::to_value(self).expect("a configuration is plain data");
-        let usual = serde_json::to_value(ModularConfig::default()).expect("a configuration is plain data");
+        let [own, usual] = self.beside_default();
         let changed = changed(&own, &usual, "");
         match changed.as_slice() {
             [] => String::new(),
             [(path, value)] => format!("{path}: {value}"),
             all => {
-                let mut parts: Vec<&str> = Vec::new();
-                for (path, _) in all {
-                    let part = path.split('.').next().expect("a path has a first name");
-                    if !parts.contains(&part) {
-                        parts.push(part);
-                    }
-                }
+                // The settings of a part follow each other.
+                let parts = all.iter().filter_map(|(path, _)| path.split('.').next());
+                let mut parts: Vec<&str> = parts.collect();
+                parts.dedup();
                 format!("{} changed settings of {}", all.len(), parts.join(", "))
             }
         }
+    }
+
+    /// These settings and the default ones, as plain data.
+    fn beside_default(&self) -> [Value; 2] {
+        [self, &ModularConfig::default()]
+            .map(|config| serde_json::to_value(config).expect("a configuration is plain data"))
     }
 
     /// Digest of all settings, `sha256:` and 64 digits. Profiles with equal settings have equal digests.

@@ -6,6 +6,7 @@ import { figure, plural } from "./words.js";
 
 /** How an action ends, in the order in which the counts come. */
 const HEAT_ENDINGS = ["avoided", "near miss", "mitigated", "hit", "others crashed", "driving system failed"];
+const HEAT_KINDS = ["good", "", "", "bad", "", "bad"];
 const HEAT_SIGNS = ["●", "◔", "◑", "○", "⊘", "✖"];
 /** A test whose road users crashed into each other shows nothing of the ego vehicle. */
 const HEAT_OTHERS = 4;
@@ -22,8 +23,9 @@ export function protocolTiles({ text, tally }) {
       el("dd", {}, count, el("small", {}, ` ${Math.round((100 * count) / all)} %`)),
       el("dt", {}, name),
     );
-  const kinds = ["good", "", "", "bad", "", "bad"];
-  const tiles = HEAT_ENDINGS.map((ending, at) => tally.endings[at] > 0 && tile(tally.endings[at], ending, kinds[at]));
+  const tiles = HEAT_ENDINGS.map(
+    (ending, at) => tally.endings[at] > 0 && tile(tally.endings[at], ending, HEAT_KINDS[at]),
+  );
   return el(
     "section",
     { id: "protocol", "aria-label": "Protocol" },

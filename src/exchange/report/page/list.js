@@ -70,12 +70,8 @@ export function filtered(scenarios) {
 export function kindOf(entry) {
   const collision = mainCollision(entry.summary);
   const [breach] = entry.summary.breaches;
-  if (!collision)
-    return breach
-      ? `breach of ${breach.requirement}`
-      : entry.summary.failure
-        ? "driving system failed"
-        : "nothing found, kept to look at";
+  if (!collision && breach) return `breach of ${breach.requirement}`;
+  if (!collision) return entry.summary.failure ? "driving system failed" : "nothing found, kept to look at";
   const { precrash, precrash_number, cause } = collision;
   const because = cause ? `, ${causeInWords(cause)}` : "";
   return `${precrash_number ? `${precrash_number} ` : ""}${precrash}${because}`;

@@ -16,6 +16,7 @@ export function recording(id) {
   return known;
 }
 
+/** @typedef {{ at_s: number, what: string, obstacle: number | null }} Event */
 /** A road user that comes so near is an event, m. */
 const NEAR_M = 10;
 /** Ticks from one look for the nearest approach to the next. */
@@ -265,7 +266,7 @@ export class Recording {
   /**
    * The event that a replay is opened for: the collision; else a breach; else the nearest approach; else the beginning
    * of a manoeuvre; else the first action.
-   * @returns {{ at_s: number, what: string, obstacle: number | null } | null}
+   * @returns {Event | null}
    */
   event() {
     const collision = this.collision();

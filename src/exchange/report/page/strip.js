@@ -3,15 +3,15 @@ import { el, refill } from "./dom.js";
 import { View } from "./view.js";
 import { atTime } from "./words.js";
 
-/** @import { Recording } from "./moment.js" */
+/** @import { Event, Recording } from "./moment.js" */
 export const STILL_LAYERS = new Set(["truth", "signals"]);
 
 /**
  * The five moments of a scenario: four seconds up to its event, or evenly through it.
  * @param {Recording} recording
+ * @param {Event | null} event
  */
-export function stillTimes(recording) {
-  const event = recording.event();
+function stillTimes(recording, event) {
   if (!event) return [0, 0.25, 0.5, 0.75, 1].map((share) => share * recording.endS);
   return [-4, -2.5, -1.5, -0.5, 0].map((before) => Math.max(0, event.at_s + before));
 }
@@ -21,10 +21,10 @@ export function stillTimes(recording) {
  * @param {View} view
  * @param {Recording} recording
  * @param {number} timeS
+ * @param {Event | null} event
  */
-export function frame(view, recording, timeS) {
+export function frame(view, recording, timeS, event) {
   const ego = recording.ego(timeS);
-  const event = recording.event();
   const partner = event && recording.obstacles(timeS).find((body) => body.id === event.obstacle);
   const reach = partner ? Math.hypot(partner.x - ego.x, partner.y - ego.y) : 20;
   const half = Math.min(Math.max(reach * 0.75, 11), 40);
@@ -41,12 +41,13 @@ export function frame(view, recording, timeS) {
  * @param {(timeS: number | null) => void} peek
  */
 export function drawStrip(place, recording, road, seek, peek) {
-  const times = stillTimes(recording);
+  const event = recording.event();
+  const times = stillTimes(recording, event);
   const views = [];
   const stills = times.map((timeS, i) => {
     const canvas = el("canvas", { "aria-hidden": "true" });
-    const event = i === times.length - 1 ? recording.event() : null;
-    const caption = `${atTime(timeS)}${event ? ` · ${event.what}` : ""}`;
+    const isLast = i === times.length - 1 && event;
+    const caption = `${atTime(timeS)}${isLast ? ` · ${event.what}` : ""}`;
     const view = new View(canvas, recording, road, STILL_LAYERS);
     views.push([view, timeS]);
     return el(
@@ -66,7 +67,7 @@ export function drawStrip(place, recording, road, seek, peek) {
   refill(place, stills);
   return () => {
     for (const [view, timeS] of views) {
-      frame(view, recording, timeS);
+      frame(view, recording, timeS, event);
       view.repaint();
       view.draw(timeS);
     }

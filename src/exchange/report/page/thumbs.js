@@ -12,13 +12,14 @@ import { View } from "./view.js";
  * @param {Entry[]} entries in the same order
  */
 export function drawWhenSeen(canvases, entries) {
-  if (!("IntersectionObserver" in globalThis)) return;
+  const entryOf = new Map(canvases.map((canvas, nth) => [canvas, entries[nth]]));
   const observer = new IntersectionObserver((seen) => {
     for (const { target, isIntersecting } of seen) {
       if (!isIntersecting) continue;
       observer.unobserve(target);
       const canvas = /** @type {HTMLCanvasElement} */ (target);
-      draw(canvas, entries[canvases.indexOf(canvas)]);
+      const entry = entryOf.get(canvas);
+      if (entry) draw(canvas, entry);
     }
   });
   canvases.forEach((canvas) => observer.observe(canvas));
@@ -30,8 +31,9 @@ export function drawWhenSeen(canvases, entries) {
  */
 async function draw(canvas, entry) {
   const [recorded, road] = await Promise.all([recording(`s${entry.n}`), ground(entry.ground)]);
-  const timeS = recorded.event()?.at_s ?? recorded.endS / 2;
+  const event = recorded.event();
+  const timeS = event?.at_s ?? recorded.endS / 2;
   const view = new View(canvas, recorded, road, STILL_LAYERS);
-  frame(view, recorded, timeS);
+  frame(view, recorded, timeS, event);
   view.draw(timeS);
 }
