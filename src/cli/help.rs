@@ -304,6 +304,8 @@ impl TypedValueParser for Named {
 
 #[cfg(test)]
 mod tests {
+    use avastra_lang::syntax::read_yaml;
+
     use super::*;
 
     /// The words of a line as a shell would take it, as far as the examples go: quotes, and output sent elsewhere.
@@ -380,7 +382,7 @@ mod tests {
     #[test]
     fn the_kubernetes_job_calls_what_there_is() {
         let text = include_str!("../../examples/cluster/kubernetes.yaml");
-        let job: serde_json::Value = serde_yaml::from_str(text).expect("it is YAML");
+        let job: serde_json::Value = read_yaml(text).expect("it is YAML");
         assert_eq!((&job["apiVersion"], &job["kind"]), (&"batch/v1".into(), &"Job".into()));
         assert_eq!(job["spec"]["completionMode"], "Indexed");
         let pod = &job["spec"]["template"]["spec"];

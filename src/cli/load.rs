@@ -14,7 +14,7 @@ use avastra_drivers::external::{Attached, ExternalSettings, Target};
 use avastra_drivers::{EXTERNAL, ModularConfig, REGISTRY};
 use avastra_lang::check::{self, KnownSpaces, Loaded, LoadedFile, ReadError};
 use avastra_lang::model::{Policy, Scenario, Space};
-use avastra_lang::syntax::{Sources, nearest, yaml_mistake};
+use avastra_lang::syntax::{Sources, nearest, read_yaml};
 use avastra_world::action::ActionTable;
 use avastra_world::places::{self, Scenes};
 use avastra_world::sim::TrafficProfile;
@@ -472,7 +472,7 @@ fn space(loaded: Loaded, path: &Path) -> Result<Arc<Space>, Failure> {
 /// # Errors
 /// If it has another form: the reason, with its place.
 pub fn parsed<T: serde::de::DeserializeOwned>(path: &Path, text: &str) -> Result<T, Failure> {
-    serde_yaml::from_str(text).map_err(|error| Failure::file("read", path, yaml_mistake(&error, text)))
+    read_yaml(text).map_err(|reason| Failure::file("read", path, reason))
 }
 
 /// The text of a file that a command needs.

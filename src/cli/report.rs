@@ -14,7 +14,7 @@ use avastra_campaign::study::StudyResults;
 use avastra_campaign::train::TrainSettings;
 use avastra_exchange::report::{self, Page, Scene, record, record_another};
 use avastra_lang::check::normal;
-use avastra_lang::syntax::listed;
+use avastra_lang::syntax::{listed, read_yaml};
 use avastra_world::action::ActionTable;
 
 use super::arguments::{FilesArguments, ReportArguments};
@@ -240,7 +240,7 @@ fn of_run(
     let mut remarks: Vec<String> = changed.into_iter().collect();
     remarks.extend(match run_directory::is_training(directory) {
         Some(true) if !is_changed => missing_of_training(directory, settings, &database)?,
-        Some(false) => match serde_yaml::from_str::<RunSettings>(settings) {
+        Some(false) => match read_yaml::<RunSettings>(settings) {
             Ok(run) => missing(directory, &run, &database, |_| true)?,
             // The work that settings of another version ask for is not known.
             Err(_) => None,
@@ -274,7 +274,7 @@ fn of_run(
         results => results.map_err(unread)?,
     };
     let results: Option<Value> = results.and_then(|text| serde_json::from_str(&text).ok());
-    let is_protocol = serde_yaml::from_str::<RunSettings>(settings).is_ok_and(|run| run.rows > 0);
+    let is_protocol = read_yaml::<RunSettings>(settings).is_ok_and(|run| run.rows > 0);
     let space = table.as_ref().filter(|_| is_protocol).map(|table| &**table.space());
     let tests = database.tests(space).map_err(unread)?;
     let heat = maps(asked, &tests, is_protocol)?.into_iter();
@@ -321,7 +321,7 @@ fn missing_of_training(
     settings: &str,
     database: &Database,
 ) -> Result<Option<String>, Failure> {
-    let Ok(training) = serde_yaml::from_str::<TrainSettings>(settings) else { return Ok(None) };
+    let Ok(training) = read_yaml::<TrainSettings>(settings) else { return Ok(None) };
     let unread = |error| Failure::file("read", &directory.join("run.db"), error);
     let (there, wanted) = (database.episodes().map_err(unread)?, training.episodes as usize);
     let lacking = wanted.saturating_sub(there.len());

@@ -22,7 +22,7 @@ use avastra_campaign::run::{
 };
 use avastra_drivers::external::{Attached, ExternalSettings};
 use avastra_lang::check::normal;
-use avastra_lang::syntax::{ast, print};
+use avastra_lang::syntax::{ast, print, read_yaml};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::ENGINE;
 
@@ -352,7 +352,7 @@ pub fn what_was_begun(directory: &Path) -> Option<Kind> {
 /// Whether the settings in `run.yaml` are those of a training; `None` if they cannot be read.
 pub fn is_training(directory: &Path) -> Option<bool> {
     let text = load::read(&directory.join("run.yaml")).ok()?;
-    let fields: serde_json::Map<String, serde_json::Value> = serde_yaml::from_str(&text).ok()?;
+    let fields: serde_json::Map<String, serde_json::Value> = read_yaml(&text).ok()?;
     Some(fields.contains_key("hyperparameters"))
 }
 

@@ -74,7 +74,7 @@ fn more_cars_come_in_the_rush_hour() {
         }))
         .expect("it is in the registry");
         let mut choose = |moment: &Moment| {
-            let (choice, _) = avastra::run::choose(random.as_mut(), moment);
+            let choice = avastra::run::choose(random.as_mut(), moment);
             let elapsed_s = moment.situation.surroundings.moment().elapsed_s;
             let is_rush = moment.situation.memory.cells()[hour].variant() == 1;
             // What a step does at its end is known to the next one.

@@ -198,7 +198,7 @@ fn rates_are_those_of_the_clock_and_not_of_the_rows() {
             _ => panic!("it learns nothing"),
         };
         let mut choose = |moment: &Moment| {
-            let (choice, _) = avastra::run::choose(random.as_mut(), moment);
+            let choice = avastra::run::choose(random.as_mut(), moment);
             let at_night = moment.situation.memory.cells()[hour].variant() == 1;
             let legal = |row: usize| table.offer(moment.situation, row).is_ok();
             let did = |rows: &[usize]| matches!(&choice, Choice::Act(draw) if rows.contains(&draw.row));

@@ -238,7 +238,7 @@ fn tried(estimate: &Estimate, setup: &Setup, from: Play, step: usize, draw: Draw
                 return Choice::Stop;
             }
         }
-        choose(agent.as_mut(), moment).0
+        choose(agent.as_mut(), moment)
     };
     let log = episode::run_from(from, &mut choices, &mut |_, _, _| {}, &mut |_| {});
     let ticks = log.ticks - begun_ticks;

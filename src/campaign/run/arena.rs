@@ -166,16 +166,11 @@ pub fn road_named(space: &Space, name: &str) -> Result<usize, RunError> {
     })
 }
 
-/// Lets an agent choose among the offers of the moment. If no row is legal, the step passes. Returns the choice, and
-/// which rows are legal, shape `(rows,)`: all of them for an agent that does not look at the mask.
-pub fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) {
+/// Lets an agent choose among the offers of the moment. If no row is legal, the step passes.
+pub fn choose(agent: &mut dyn Agent, moment: &Moment) -> Choice {
     let mut offers = Offers::of(agent, moment);
     let row = offers.chosen_by(agent);
-    let legal = match agent.looks_at_mask() {
-        true => offers.legal(),
-        false => Array1::from_elem(offers.rows(), true),
-    };
-    (offers.choice(row), legal)
+    offers.choice(row)
 }
 
 /// The offers of all rows at this moment. A row is judged when a caller asks for it.

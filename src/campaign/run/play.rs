@@ -204,7 +204,7 @@ impl Run {
 /// Plays an episode of a setup with an agent.
 fn played_by(setup: &episode::Setup, agent: &mut dyn Agent) -> EpisodeLog {
     agent.begin(setup.seed);
-    episode::run(setup, &mut |moment: &Moment| choose(agent, moment).0)
+    episode::run(setup, &mut |moment: &Moment| choose(agent, moment))
 }
 
 /// Plays and judges episodes on `jobs` threads and hands each to `done` on this one, in the order in

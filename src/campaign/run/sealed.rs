@@ -20,6 +20,7 @@ use crate::files;
 use crate::files::NotPlain;
 use avastra_base::outside::{Shown, in_line};
 use avastra_lang::model::digest_text;
+use avastra_lang::syntax::read_yaml;
 
 /// Tables that every layout has.
 const TABLES: &str = "
@@ -520,7 +521,7 @@ const NAMED_MAX: usize = 8;
 
 /// The settings that differ, each by its path with what it was; `None` if there is none.
 pub fn differences(begun: &str, now: &str) -> Option<String> {
-    let read = |text: &str| serde_yaml::from_str::<Map<String, Value>>(text).unwrap_or_default();
+    let read = |text: &str| read_yaml::<Map<String, Value>>(text).unwrap_or_default();
     let mut differ = Vec::new();
     fields_that_differ("", &read(begun), &read(now), &mut differ);
     let more = differ.len().saturating_sub(NAMED_MAX);

@@ -5,7 +5,7 @@ use crate::oracle::AvoidabilitySettings;
 use avastra_drivers as ads;
 use avastra_drivers::external::{Attached, Failure, RecordError};
 use avastra_lang::model::Space;
-use avastra_lang::syntax::{listed, nearest};
+use avastra_lang::syntax::{listed, nearest, read_yaml};
 use avastra_search::agent;
 use avastra_world::sim::{ENGINE, TrafficError};
 
@@ -71,7 +71,7 @@ impl Conditions {
 /// The fields of settings in which nothing is nested: those under `conditions` stand beside the others, as in settings of earlier
 /// builds; and whether there are `conditions`. `None` if the text is no settings.
 pub fn flat(settings: &str) -> Option<(serde_json::Map<String, serde_json::Value>, bool)> {
-    let mut fields: serde_json::Map<String, serde_json::Value> = serde_yaml::from_str(settings).ok()?;
+    let mut fields: serde_json::Map<String, serde_json::Value> = read_yaml(settings).ok()?;
     let Some(serde_json::Value::Object(conditions)) = fields.remove("conditions") else {
         return Some((fields, false));
     };

@@ -102,6 +102,8 @@ impl core::fmt::Display for Shard {
 
 #[cfg(test)]
 mod tests {
+    use avastra_lang::syntax::read_yaml;
+
     use super::*;
 
     #[test]
@@ -128,8 +130,8 @@ mod tests {
         for wrong in ["", "3", "0/8", "9/8", "1/0", "a/b", "1/1000000", "-1/8"] {
             assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
         }
-        assert!(serde_yaml::from_str::<Shard>("shard: 9\nof: 8\n").is_err());
+        assert!(read_yaml::<Shard>("shard: 9\nof: 8\n").is_err());
         let text = serde_yaml::to_string(&Shard::new(3, 8).unwrap()).unwrap();
-        assert_eq!(serde_yaml::from_str::<Shard>(&text).unwrap(), Shard::new(3, 8).unwrap());
+        assert_eq!(read_yaml::<Shard>(&text).unwrap(), Shard::new(3, 8).unwrap());
     }
 }

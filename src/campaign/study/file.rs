@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 
 use crate::run::DEFAULT_ADS;
-use avastra_lang::syntax::yaml_mistake;
+use avastra_lang::syntax::read_yaml;
 
 /// A study file. Paths are relative to it.
 #[derive(Debug, Clone, PartialEq, serde::Deserialize)]
@@ -130,6 +130,6 @@ impl StudyFile {
     /// # Errors
     /// If the text has another form: the reason, with its place.
     pub fn from_yaml(text: &str) -> Result<StudyFile, String> {
-        serde_yaml::from_str(text).map_err(|error| yaml_mistake(&error, text))
+        read_yaml(text)
     }
 }

@@ -47,7 +47,7 @@ pub fn evaluate(
         let setup = arena.setup((number % arena.roads() as u64) as usize, seed);
         let mut agent = make();
         agent.begin(seed);
-        let mut choose = |moment: &episode::Moment| choose(agent.as_mut(), moment).0;
+        let mut choose = |moment: &episode::Moment| choose(agent.as_mut(), moment);
         let log = episode::run(&setup, &mut choose);
         let counted = EpisodeSummary::judged(&setup, number as usize, &log).counted() as u64;
         sum += log.steps.iter().map(|step| step.reward).sum::<f64>();

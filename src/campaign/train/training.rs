@@ -9,12 +9,14 @@ use ndarray::Array1;
 use crate::episode;
 use crate::episode::{Choice, End, EpisodeLog, Moment, Play, Script, Setup};
 use crate::run::{
-    Arena, Conditions, EpisodeSummary, Finding, RunError, agent_named, check_episodes, choose, legal,
+    Arena, Conditions, EpisodeSummary, Finding, Offers, RunError, agent_named, check_episodes, legal,
 };
 use avastra_base::rng;
 use avastra_base::rng::Stream;
 use avastra_lang::model::Space;
-use avastra_search::agent::{Diverged, Experience, Kind, Lesson, Rows, Settings, Trainable, Trajectory};
+use avastra_search::agent::{
+    Diverged, Experience, Kind, Lesson, Mask, Rows, Settings, Trainable, Trajectory,
+};
 use avastra_search::mdp;
 use avastra_search::mdp::{Observation, ProcKind, StepOutcome};
 use avastra_world::action::ActionTable;
@@ -177,7 +179,13 @@ fn play(setup: &Setup, agent: &mut dyn Trainable) -> Unjudged {
     let mut last = None;
     let looks_at_mask = agent.looks_at_mask();
     let mut make_choice = |moment: &Moment| {
-        let (choice, legal) = choose(agent, moment);
+        let mut offers = Offers::of(agent, moment);
+        let row = offers.chosen_by(agent);
+        let legal = match looks_at_mask {
+            true => offers.legal(),
+            false => Array1::from_elem(offers.rows(), true),
+        };
+        let choice = offers.choice(row);
         let row = match &choice {
             Choice::Act(draw) => Some(draw.row),
             Choice::Await(action) => Some(action.row),

@@ -79,7 +79,7 @@ pub(super) fn visits(
         let setup = arena.setup((number % arena.roads() as u64) as usize, seed);
         let mut agent = visiting.clone();
         agent.begin(seed);
-        episode::run(&setup, &mut |moment: &Moment| choose(&mut agent, moment).0);
+        episode::run(&setup, &mut |moment: &Moment| choose(&mut agent, moment));
     }
     visiting.visits()
 }

@@ -216,7 +216,7 @@ impl Checks<'_> {
         };
         let mut agent = build();
         let mut choose = |moment: &episode::Moment| {
-            if moment.step >= steps { Choice::Stop } else { choose(agent.as_mut(), moment).0 }
+            if moment.step >= steps { Choice::Stop } else { choose(agent.as_mut(), moment) }
         };
         episode::run(&setup, &mut choose)
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use avastra_lang::syntax::yaml_mistake;
+use avastra_lang::syntax::read_yaml;
 use avastra_world::sim::{DT_S, FRAME_S};
 
 use super::message::{AnswerKind, Observation};
@@ -234,16 +234,15 @@ impl ExternalSettings {
     /// # Errors
     /// The mistake in the block, or in the text as YAML.
     pub fn from_yaml(text: &str, folder: &Path) -> Option<Result<ExternalSettings, ExternalError>> {
-        let mistake = |error| ExternalError::Yaml(yaml_mistake(&error, text));
-        let whole: serde_json::Value = match serde_yaml::from_str(text) {
+        let whole: serde_json::Value = match read_yaml(text) {
             Ok(whole) => whole,
-            Err(error) => return Some(Err(mistake(error))),
+            Err(error) => return Some(Err(ExternalError::Yaml(error))),
         };
         whole.get("ads").map(|block| {
             if !block.is_object() {
                 return Err(ExternalError::NoBlock);
             }
-            let profile: Profile = serde_yaml::from_str(text).map_err(mistake)?;
+            let profile: Profile = read_yaml(text).map_err(ExternalError::Yaml)?;
             let mut settings = profile.ads;
             settings.working_directory = settings.working_directory.map(|directory| folder.join(directory));
             settings.checked()

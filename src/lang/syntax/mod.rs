@@ -40,7 +40,7 @@ pub use record::{
     DiagnosticRecord, EditRecord, FixRecord, LabelRecord, PlaceRecord, SCHEMA, apply_fixes, record,
 };
 pub use unfinished::{HERE, Unfinished, declaration_start, unfinished};
-pub use yaml::{settings_mistake, yaml_mistake};
+pub use yaml::{read_yaml, settings_mistake};
 
 #[cfg(test)]
 mod tests;

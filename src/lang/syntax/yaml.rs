@@ -1,23 +1,123 @@
 //! Mistakes in a settings file in YAML, in words for its author: line, field, and what is allowed.
 
+use serde::de::{Deserialize, DeserializeOwned, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde_path_to_error::{Path, Segment};
+use serde_yaml::Spanned;
+
 use super::diagnostic::listed;
 use super::nearest;
 
-/// The message for an error of the YAML reader, whose own words speak of Rust and of YAML's grammar.
-pub fn yaml_mistake(error: &serde_yaml::Error, text: &str) -> String {
-    let said = error.to_string();
+/// Reads a value from a text in YAML, by way of JSON's values: so the parser is compiled once, and not once for each type.
+///
+/// # Errors
+/// If the text is no YAML or has another form: the reason, with its line.
+pub fn read_yaml<T: DeserializeOwned>(text: &str) -> Result<T, String> {
+    let value: serde_json::Value =
+        serde_yaml::from_str(text).map_err(|error| mistake(&error.to_string(), text))?;
+    serde_path_to_error::deserialize(value)
+        .map_err(|error| misfit(&error.inner().to_string(), error.path(), text))
+}
+
+/// The message for a value that its reader refuses; `path` leads to it.
+fn misfit(said: &str, path: &Path, text: &str) -> String {
+    let (mut line, mut field, mut reached) = (1, None, serde_yaml::from_str::<Lines>(text).ok());
+    for step in path {
+        let Some(lines) = reached else { break };
+        let next = match (step, lines) {
+            (Segment::Seq { index }, Lines::List(items)) => {
+                items.into_iter().nth(*index).map(|item| (item.referenced, item.value))
+            }
+            (Segment::Map { key }, Lines::Map(entries)) => {
+                field = Some(key.as_str());
+                let found = entries.into_iter().find(|(name, _)| name.value == *key);
+                found.map(|(name, value)| (name.referenced, value))
+            }
+            _ => None,
+        };
+        reached = next.map(|(place, value)| {
+            line = place.line();
+            value
+        });
+    }
+    format!("line {line}: {}", settings_mistake(said, field))
+}
+
+/// Where the parts of a text stand.
+enum Lines {
+    Value,
+    List(Vec<Spanned<Lines>>),
+    Map(Vec<(Spanned<String>, Lines)>),
+}
+
+impl<'de> Deserialize<'de> for Lines {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Lines, D::Error> {
+        struct Reader;
+
+        impl<'de> Visitor<'de> for Reader {
+            type Value = Lines;
+
+            fn expecting(&self, to: &mut std::fmt::Formatter) -> std::fmt::Result {
+                to.write_str("any value")
+            }
+
+            fn visit_bool<E>(self, _: bool) -> Result<Lines, E> {
+                Ok(Lines::Value)
+            }
+
+            fn visit_i64<E>(self, _: i64) -> Result<Lines, E> {
+                Ok(Lines::Value)
+            }
+
+            fn visit_u64<E>(self, _: u64) -> Result<Lines, E> {
+                Ok(Lines::Value)
+            }
+
+            fn visit_f64<E>(self, _: f64) -> Result<Lines, E> {
+                Ok(Lines::Value)
+            }
+
+            fn visit_str<E>(self, _: &str) -> Result<Lines, E> {
+                Ok(Lines::Value)
+            }
+
+            fn visit_unit<E>(self) -> Result<Lines, E> {
+                Ok(Lines::Value)
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Lines, A::Error> {
+                let mut list = Vec::new();
+                while let Some(item) = items.next_element()? {
+                    list.push(item);
+                }
+                Ok(Lines::List(list))
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Lines, A::Error> {
+                let mut map = Vec::new();
+                while let Some(entry) = entries.next_entry()? {
+                    map.push(entry);
+                }
+                Ok(Lines::Map(map))
+            }
+        }
+
+        deserializer.deserialize_any(Reader)
+    }
+}
+
+/// The message for what the YAML reader said, whose own words speak of Rust and of YAML's grammar.
+fn mistake(said: &str, text: &str) -> String {
     let first = said.trim().lines().next().unwrap_or_default();
     let first = first.strip_prefix("error: ").unwrap_or(first);
     // `line 3 column 5: what is wrong`
-    let placed = first.strip_prefix("line ").and_then(|rest| rest.split_once(' '));
-    let placed = placed.and_then(|(line, rest)| {
-        let (column, what) = rest.split_once(": ")?;
-        let column = column.strip_prefix("column ").and_then(|column| column.parse::<usize>().ok());
-        Some((line.parse::<usize>().ok()?, column, what))
+    let placed = first.strip_prefix("line ").and_then(|rest| {
+        let (place, what) = rest.split_once(": ")?;
+        let (line, column) = place.split_once(" column ")?;
+        Some((line.parse::<usize>().ok()?, column.parse::<usize>().ok()?, what))
     });
     let Some((line, column, what)) = placed else { return settings_mistake(first, None) };
     let (line, column) =
-        if what.contains(GOES_ON) { (opening_line(text, line), None) } else { (line, column) };
+        if what.contains(GOES_ON) { (opening_line(text, line), None) } else { (line, Some(column)) };
     let written = text.lines().nth(line.saturating_sub(1)).unwrap_or_default();
     // One line may hold several keys: `agents: [{ name: random, repeats: 2 }]`.
     let before: Option<String> =
@@ -179,6 +279,8 @@ fn found_in_words(found: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::*;
 
     #[derive(Debug, serde::Deserialize)]
@@ -192,20 +294,33 @@ mod tests {
 
     #[test]
     fn mistakes_name_line_and_field_and_what_is_allowed() {
-        let said = |text: &str| {
-            let error = serde_yaml::from_str::<Settings>(text).expect_err("it is wrong");
-            yaml_mistake(&error, text)
-        };
+        let said = |text: &str| read_yaml::<Settings>(text).expect_err("it is wrong");
         assert_eq!(said("seed: 3\npace_mp: 4\n"), "line 2: there is no `pace_mp`; did you mean `pace_mps`?");
         assert_eq!(said("x: 3\n"), "line 1: there is no `x`; there are `seed`, `pace_mps` and `yields`");
-        assert_eq!(said("seed: abc\n"), "line 1: `seed`: write a whole number");
-        assert_eq!(said("pace_mps: fast\n"), "line 1: `pace_mps`: write a number");
+        assert_eq!(said("seed: abc\n"), "line 1: `seed`: write a whole number, not the text `abc`");
+        assert_eq!(said("pace_mps: fast\n"), "line 1: `pace_mps`: write a number, not the text `fast`");
         let infinite = "seed: 1\npace_mps: -.inf\n";
-        let error = serde_yaml::from_str::<serde_json::Value>(infinite).expect_err("it is wrong");
-        assert_eq!(yaml_mistake(&error, infinite), "line 2: `pace_mps`: write a number");
-        assert_eq!(said("seed: 1\nyields: maybe\n"), "line 2: `yields`: write `true` or `false`");
+        let error = read_yaml::<serde_json::Value>(infinite).expect_err("it is wrong");
+        assert_eq!(error, "line 2: `pace_mps`: write a number");
+        assert_eq!(
+            said("seed: 1\nyields: maybe\n"),
+            "line 2: `yields`: write `true` or `false`, not the text `maybe`"
+        );
         assert_eq!(said("seed: 3\nseed: 4\n"), "line 2: `seed` stands twice");
-        assert_eq!(said("{ pace_mps: 4, seed: abc }\n"), "line 1: `seed`: write a whole number");
+        assert_eq!(
+            said("{ pace_mps: 4, seed: abc }\n"),
+            "line 1: `seed`: write a whole number, not the text `abc`"
+        );
+        // The key stands above its value, and the item that is wrong in a list.
+        let lists = |text: &str| read_yaml::<BTreeMap<String, Vec<Settings>>>(text).expect_err("it is wrong");
+        assert_eq!(
+            lists("a:\n  - seed: 1\n\n  - { seed: 2 }\nb:\n  -\n    pace_mps: 1\n    sed: 3\n"),
+            "line 8: there is no `sed`; did you mean `seed`?"
+        );
+        assert_eq!(
+            lists("a:\n  - seed: 1\n  - fast\n"),
+            "line 3: `a`: write `key: value` lines, not the text `fast`"
+        );
     }
 
     #[test]
@@ -236,8 +351,8 @@ mod tests {
             ("a: [1}\n", 1, bracket),
             ("a: ]\n", 1, bracket),
         ] {
-            let error = serde_yaml::from_str::<serde_json::Value>(text).expect_err("it is wrong");
-            assert_eq!(yaml_mistake(&error, text), format!("line {line}: {ours}"), "{text:?}: {error}");
+            let error = read_yaml::<serde_json::Value>(text).expect_err("it is wrong");
+            assert_eq!(error, format!("line {line}: {ours}"), "{text:?}");
         }
     }
 

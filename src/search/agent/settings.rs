@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde_json::{Map, Value};
 
 use crate::mdp::{ProcKind, RewardSettings};
-use avastra_lang::syntax::{listed, yaml_mistake};
+use avastra_lang::syntax::{listed, read_yaml};
 
 use super::checked::{SettingsError, changed, record};
 use super::choice::Rows;
@@ -122,8 +122,7 @@ fn from_preset(presets: &[Preset], preset: Option<&str>, text: &str) -> Result<S
 
 /// The settings of a YAML text by name.
 fn lines(text: &str) -> Result<Map<String, Value>, SettingsError> {
-    let read: Option<Value> =
-        serde_yaml::from_str(text).map_err(|error| SettingsError::Text(yaml_mistake(&error, text)))?;
+    let read: Option<Value> = read_yaml(text).map_err(SettingsError::Text)?;
     match read {
         None | Some(Value::Null) => Ok(Map::new()),
         Some(Value::Object(lines)) => Ok(lines),

@@ -6,7 +6,7 @@
 //! profile changes signals, conflict areas among other vehicles, bodies or friction.
 
 use avastra_lang::model::{LIMIT_PART_MAX, digest};
-use avastra_lang::syntax::{listed, yaml_mistake};
+use avastra_lang::syntax::{listed, read_yaml};
 
 section! {
     /// How other vehicles drive.
@@ -113,12 +113,12 @@ impl TrafficProfile {
     /// # Errors
     /// Text that is no YAML or says nothing, an unknown key, a value of the wrong type or out of its range.
     pub fn from_yaml(text: &str) -> Result<TrafficProfile, TrafficError> {
-        let refuse = |error: serde_yaml::Error| TrafficError::Yaml { reason: yaml_mistake(&error, text) };
-        let file: serde_json::Value = serde_yaml::from_str(text).map_err(refuse)?;
+        let refuse = |reason| TrafficError::Yaml { reason };
+        let file: serde_json::Value = read_yaml(text).map_err(refuse)?;
         if file.is_null() {
             return Err(TrafficError::Empty);
         }
-        let profile: TrafficProfile = serde_yaml::from_str(text).map_err(refuse)?;
+        let profile: TrafficProfile = read_yaml(text).map_err(refuse)?;
         profile.check()?;
         Ok(profile)
     }

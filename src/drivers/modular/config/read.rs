@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 
 use crate::kit::{PedalsConfig, SteeringConfig};
 use avastra_lang::model::digest;
-use avastra_lang::syntax::{nearest, yaml_mistake};
+use avastra_lang::syntax::{nearest, read_yaml};
 
 use super::ModularConfig;
 use super::driving::{ActuatorsConfig, PlanningConfig, PredictionConfig};
@@ -55,8 +55,7 @@ impl ModularConfig {
     /// Text that is no YAML or says nothing at all, a key that does not exist, a value of the wrong type
     /// or out of its range.
     pub fn from_yaml(text: &str) -> Result<ModularConfig, ConfigError> {
-        let file: Value = serde_yaml::from_str(text)
-            .map_err(|error| ConfigError::Yaml { reason: yaml_mistake(&error, text) })?;
+        let file: Value = read_yaml(text).map_err(|reason| ConfigError::Yaml { reason })?;
         let mut whole =
             serde_json::to_value(ModularConfig::default()).expect("a configuration is plain data");
         // An empty file is more likely a slip, or was cut off, than a wish for the default.
@@ -250,7 +249,7 @@ mod tests {
     fn the_file_is_the_default_and_every_setting_in_it_is_explained() {
         let text = shipped("default.yaml");
         assert_eq!(ModularConfig::from_yaml(&text).unwrap(), ModularConfig::default());
-        let written: Value = serde_yaml::from_str(&text).unwrap();
+        let written: Value = read_yaml(&text).unwrap();
         assert_eq!(written, serde_json::to_value(ModularConfig::default()).unwrap(), "nothing is left out");
         let lines: Vec<&str> = text.lines().collect();
         for pair in lines.windows(2).filter(|pair| pair[1].contains(": ") && !pair[1].contains('#')) {
