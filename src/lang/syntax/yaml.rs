@@ -1,4 +1,4 @@
-//! Mistakes in a settings file in YAML, in words for its author: line, field, and what is allowed.
+//! Reads files in YAML. A mistake is told in words for its author: line, field, and what is allowed.
 
 use serde::de::{Deserialize, DeserializeOwned, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_path_to_error::{Path, Segment};
@@ -20,7 +20,8 @@ pub fn read_yaml<T: DeserializeOwned>(text: &str) -> Result<T, String> {
 
 /// The message for a value that its reader refuses; `path` leads to it.
 fn misfit(said: &str, path: &Path, text: &str) -> String {
-    let (mut line, mut field, mut reached) = (1, None, serde_yaml::from_str::<Lines>(text).ok());
+    let Ok(whole) = serde_yaml::from_str::<Lines>(text) else { return settings_mistake(said, None) };
+    let (mut line, mut field, mut reached) = (1, None, Some(whole));
     for step in path {
         let Some(lines) = reached else { break };
         let next = match (step, lines) {
@@ -42,7 +43,8 @@ fn misfit(said: &str, path: &Path, text: &str) -> String {
     format!("line {line}: {}", settings_mistake(said, field))
 }
 
-/// Where the parts of a text stand.
+/// Where the parts of a text stand: each item of a list, and each key of a map. JSON's values do not say it, so a text with a
+/// mistake is read again.
 enum Lines {
     Value,
     List(Vec<Spanned<Lines>>),

@@ -113,12 +113,9 @@ impl TrafficProfile {
     /// # Errors
     /// Text that is no YAML or says nothing, an unknown key, a value of the wrong type or out of its range.
     pub fn from_yaml(text: &str) -> Result<TrafficProfile, TrafficError> {
-        let refuse = |reason| TrafficError::Yaml { reason };
-        let file: serde_json::Value = read_yaml(text).map_err(refuse)?;
-        if file.is_null() {
-            return Err(TrafficError::Empty);
-        }
-        let profile: TrafficProfile = read_yaml(text).map_err(refuse)?;
+        let profile: Option<TrafficProfile> =
+            read_yaml(text).map_err(|reason| TrafficError::Yaml { reason })?;
+        let profile = profile.ok_or(TrafficError::Empty)?;
         profile.check()?;
         Ok(profile)
     }
