@@ -15,7 +15,7 @@ played() {
     name=$1
     shift
     rm -rf "$work/run"
-    "$avastra" run "$@" --replays 0 --quiet --out "$work/run" > /dev/null
+    "$avastra" run "$@" --repeat 0 --quiet --out "$work/run" > /dev/null
     { sqlite3 "$work/run/run.db" .dump; cat "$work"/run/critical/*.ava; } 2> /dev/null | sha256sum | cut -c -64 | tr "\n" " "
     echo "$name"
 }

@@ -12,7 +12,7 @@ played() {
     episodes=$1
     shift
     rm -rf "$work"
-    target/twin/avastra run "$@" --replays 0 --episodes "$episodes" --seed "$((all + 1))" --quiet --out "$work" > /dev/null
+    target/twin/avastra run "$@" --repeat 0 --episodes "$episodes" --seed "$((all + 1))" --quiet --out "$work" > /dev/null
     all=$((all + 1))
     echo "the same: $episodes episodes a road of $*"
 }

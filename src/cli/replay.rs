@@ -1,10 +1,12 @@
 //! `avastra replay`: plays emitted scenarios and policies again and checks every claim.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use avastra_base::outside::Shown;
-use avastra_campaign::episode::{Breach, Collision, EpisodeLog};
+use avastra_campaign::episode::{Breach, Collision, EpisodeLog, Script};
 use avastra_campaign::oracle;
+use avastra_campaign::oracle::{Found, Recurrence, Replayed as PlayedAgain, mixed_text};
 use avastra_campaign::run::{Asked, Gauges, Stage};
 use avastra_drivers::Selected;
 use avastra_lang::check::Loaded;
@@ -40,7 +42,8 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
         let (ads, is_recorded) = asked.selected_for(&scenario)?;
         let in_file = |played: Played| Replayed::Scenario(Box::new(played));
         if is_recorded {
-            return play(&table, &scenario, path, (&ads, None), changed.as_ref()).map(in_file);
+            return play((&table, &scenario), path, (&ads, None), changed.as_ref(), arguments.repeat)
+                .map(in_file);
         }
         let profile = arguments.against.ads.as_deref().and_then(load::profile_path);
         let name = match (profile, ads.program()) {
@@ -48,7 +51,7 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
             (Some(path), None) => format!("{} with {}", ads.name(), path.shown()),
             (None, None) => ads.name().to_owned(),
         };
-        play(&table, &scenario, path, (&ads, Some(name)), changed.as_ref()).map(in_file)
+        play((&table, &scenario), path, (&ads, Some(name)), changed.as_ref(), arguments.repeat).map(in_file)
     })?;
     let (mut scenarios, mut policies, mut refuted) = (Vec::new(), Vec::new(), 0);
     for found in &played.done {
@@ -156,13 +159,13 @@ struct Played {
 }
 
 /// Plays a scenario. With a name for the driving system it is another one than the recorded: no claim is checked. `changed`
-/// are the changes since the file was written.
+/// are the changes since the file was written. Its findings are played up to `repeat` times more.
 fn play(
-    table: &ActionTable,
-    scenario: &Scenario,
+    (table, scenario): (&ActionTable, &Scenario),
     path: &Path,
     (ads, other): (&Selected, Option<String>),
     changed: Option<&Changed>,
+    repeat: u32,
 ) -> Result<Played, Failure> {
     let stage = Stage::new(table, scenario)?;
     let mut gauges = Gauges::default();
@@ -228,6 +231,11 @@ fn play(
             lines.chain(crashes).chain(failure).chain(end).collect::<Vec<_>>().join("\n")
         }
     };
+    let again = recurrences((table, scenario), &stage, (ads, &log), repeat);
+    let is_mixed = mixed_text(doubted.is_some());
+    let again_text = again.iter().map(|again| format!("\n  {}{is_mixed}", again.in_words()));
+    let told = told + &again_text.collect::<String>();
+    let told = told.trim_start_matches('\n').to_owned();
     let crashes: Vec<_> = log.incidents.iter().map(|crash| {
         serde_json::json!({ "at_s": crash.time_s, "obstacle": crash.obstacle, "other": crash.other })
     }).collect();
@@ -246,10 +254,62 @@ fn play(
         "reproducible": doubted.is_none(), "failure": log.failure.as_ref().map(|failure| failure.in_words()),
         "held": log.held.iter().map(|held| serde_json::json!({ "from_s": held.from_s, "by": held.text() })).collect::<Vec<_>>(),
         "breaches": log.breaches.iter().map(breach).collect::<Vec<_>>(), "crashes": crashes, "severities": severities, "priorities": priorities, "criticality": criticality, "pet_s": pet_s,
+        "recurrence": again,
     });
     let has_ads_failed = other.is_some() && log.failure.is_some();
     let (path, name) = (path.to_owned(), scenario.name.clone());
     Ok(Played { path, name, claims, banner, told, has_ads_failed, result })
+}
+
+/// Whether a finding of a play recurs.
+#[derive(serde::Serialize)]
+struct Again {
+    /// Number of the road user that is hit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    obstacle: Option<u32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    requirement: Option<String>,
+    #[serde(flatten)]
+    recurrence: Recurrence,
+}
+
+impl Again {
+    fn in_words(&self) -> String {
+        let what = match (&self.requirement, self.obstacle) {
+            (Some(requirement), _) => format!("`{requirement}`"),
+            (None, obstacle) => format!("the collision with #{}", obstacle.unwrap_or_default()),
+        };
+        format!("{what} {}", self.recurrence.in_words())
+    }
+}
+
+/// Plays a scenario up to `repeat` times more, for each counted collision and each requirement that is breached in a log of it.
+/// Nothing if the driving system cannot be asked.
+fn recurrences(
+    (table, scenario): (&ActionTable, &Scenario),
+    stage: &Stage,
+    (ads, log): (&Selected, &EpisodeLog),
+    repeat: u32,
+) -> Vec<Again> {
+    if repeat == 0 || !oracle::can_replay(ads) {
+        return Vec::new();
+    }
+    let setup = stage.setup(ads);
+    let again = PlayedAgain::new(&setup, &Script::of_scenario(scenario), log);
+    let tested = |found| again.tested(found, repeat);
+    let collisions = stage.counted(ads, log).into_iter().map(|index| Again {
+        obstacle: Some(log.collisions[index].contact.obstacle),
+        requirement: None,
+        recurrence: tested(Found::Collision(index)),
+    });
+    let mut known = BTreeSet::new();
+    let firsts = log.breaches.iter().enumerate().filter(|(_, breach)| known.insert(breach.requirement));
+    let breaches = firsts.map(|(index, breach)| Again {
+        obstacle: None,
+        requirement: Some(table.space().requirements[breach.requirement].name.to_string()),
+        recurrence: tested(Found::Breach(index)),
+    });
+    collisions.chain(breaches).collect()
 }
 
 /// The requirements that another driving system breaches, and the claimed breaches that it avoids.

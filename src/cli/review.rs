@@ -120,7 +120,7 @@ pub fn review(
     let episode = scenario.origin.episode.unwrap_or(0) as usize;
     let mut summary = EpisodeSummary::judged(&setup, episode, &log);
     summary.find_keepers(&setup, &log);
-    let replays = scenario.replays();
+    let replays = stage.most_replays();
     summary.find_recurrence(&setup, &Script::of_scenario(&scenario), &log, replays);
     let change = match &illegal {
         None => change(&scenario, (&log, &summary), table, results),

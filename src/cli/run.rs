@@ -109,7 +109,7 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
 fn can_fail_on(fail_on: &[FailOn], space: &Space, replays: u32) -> Result<(), Failure> {
     let why = match () {
         () if fail_on.contains(&FailOn::Recurring) && replays == 0 => {
-            "`--fail-on recurring` needs replays, and the run has `--replays 0`: begin one with `--replays 20`"
+            "`--fail-on recurring` needs replays, and the run has `--repeat 0`: begin one with `--repeat 20`"
         }
         () if fail_on.contains(&FailOn::Breach) && space.requirements.is_empty() => {
             "`--fail-on breach` needs a requirement, and the space has none: add `use \"law.ava\"`, or a `require`"

@@ -249,8 +249,8 @@ shrink
   FAILED
 test
   still_fails number scenarios with the same crash
-  fixed number scenarios without one, by the driving system that they were found with
-  passed number scenarios without one, by another driving system, or by one that is not deterministic in all of its plays
+  fixed number scenarios without a failure, whose rate of failures under other noise is below `--below` with 95 %
+  passed number scenarios without a failure that were not played often enough to be `fixed`, or that were found with another driving system
   recorded number scenarios that were played from recorded answers: no program was asked
   changed number scenarios with another crash, that never meet the obstacle, whose crash a review finds gone, or that no longer fail from recorded answers
   errors number scenarios that could not be played
@@ -265,7 +265,7 @@ test
   scenarios[].reason text may be empty
   scenarios[].recorded bool from recorded answers: no program was asked
   scenarios[].found_with text? the driving system that found it, if it is another than the one under test
-  scenarios[].plays number 1; more where the driving system is not deterministic
+  scenarios[].again object? plays under other noise (`replays`), and those that failed (`recurred`)
 report
   page text its path
   scenarios number on the page

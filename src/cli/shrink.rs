@@ -45,7 +45,7 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
     }
     let asked = load::asked(arguments.against.ads.as_deref())?;
     let shrunk = each_file(output, &arguments.many, asked.external.as_ref(), |file| {
-        smaller(output, file, arguments.output.as_ref(), &asked)
+        smaller(output, file, arguments, &asked)
     })?;
     let done = &shrunk.done;
     for small in done {
@@ -182,7 +182,13 @@ fn apart(file: &Path) -> Result<PathBuf, Failure> {
 }
 
 /// Shrinks the scenario of a file into another, for which the user may have named a path.
-fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked) -> Result<Small, Failure> {
+fn smaller(
+    output: &Output,
+    file: &Path,
+    arguments: &ShrinkArguments,
+    asked: &Asked,
+) -> Result<Small, Failure> {
+    let named = arguments.output.as_ref();
     let (table, scenario) = look::unchanged(output, file)?;
     let (ads, _) = asked.selected_for(&scenario)?;
     if ads.program().is_some_and(|program| !program.can_start()) {
@@ -205,7 +211,7 @@ fn smaller(output: &Output, file: &Path, named: Option<&PathBuf>, asked: &Asked)
         };
         return Err(Failure::usage(message));
     };
-    let replays = scenario.replays();
+    let replays = arguments.repeat.unwrap_or_else(|| stage.most_replays());
     let shrunk = oracle::shrink(&stage.setup(&ads), &log, found, &judgements, replays);
 
     let path = named.map_or_else(|| apart(file), |path| Ok(path.clone()))?;

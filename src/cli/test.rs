@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use avastra_base::outside::{Shown, in_markup};
-use avastra_base::statistics::proportion;
-use avastra_campaign::episode::EpisodeLog;
+use avastra_campaign::episode::{Breach, EpisodeLog, Script};
 use avastra_campaign::files;
-use avastra_campaign::oracle::{self, Regression};
+use avastra_campaign::oracle::{self, Found, REPLAYS, Recurrence, Regression, Replayed, mixed_text};
 use avastra_campaign::run::{self, Asked, RunError, Stage};
 use avastra_drivers::external::{Failure as AdsFailure, FailureKind};
 use avastra_drivers::{EXTERNAL, Selected};
@@ -18,7 +17,7 @@ use avastra_lang::syntax::ast::FileId;
 use avastra_lang::syntax::{Diagnostic, Sources};
 use avastra_world::action::ActionTable;
 
-use super::arguments::{FilesArguments, REPLAYS, TestArguments};
+use super::arguments::{FilesArguments, TestArguments};
 use super::clock::now;
 use super::error::Failure;
 use super::files::{without_links, write_again, write_anew, write_named};
@@ -38,6 +37,10 @@ struct Case {
     road: String,
     outcome: Outcome,
     by: By,
+    /// How often it failed in plays under other noise, if there were any.
+    again: Option<Recurrence>,
+    /// The rate of failures below which it is fixed.
+    below: f64,
     elapsed_s: f64,
 }
 
@@ -48,8 +51,8 @@ struct By {
     is_recorded: bool,
     /// Name of the driving system that it was found with, if another one played it.
     found_with: Option<String>,
-    /// Plays with the driving system under test, if that need not repeat itself.
-    loose_plays: Option<u32>,
+    /// Whether the driving system under test need not repeat itself.
+    is_mixed: bool,
 }
 
 enum Outcome {
@@ -111,7 +114,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     spot_check(program, driven.map(|case| case.file.as_path()));
     // It may say that it is deterministic, and be found to be otherwise just now.
     if program.is_some_and(|program| !program.is_deterministic()) {
-        play_loosely(output, &suite, &mut cases)?;
+        play_again(output, &suite, &mut cases)?;
     }
     if let Some(path) = &arguments.junit {
         // A folder that is misspelt is not made.
@@ -128,16 +131,18 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     let recorded = cases.iter().filter(|case| case.by.is_recorded).count();
     let is_changed = |case: &&Case| matches!(case.in_words().0, "changed" | "gone");
     let changed = cases.iter().filter(is_changed).count();
-    let changed_fails = cases.iter().filter(is_changed).filter(|case| case.outcome.is_failure()).count();
+    let changed_fails = cases.iter().filter(is_changed).filter(|case| case.is_failure()).count();
     if arguments.accept {
         output.say(&format!("{} written anew", plural(accepted, "scenario")));
     }
     output.say(&format!(
-        "{}: {fails} still fail, {fixed} fixed, {}{changed} changed{}, {errors} not played",
+        "{}: {fails} still fail, {fixed} fixed, {passed} {PASSED}, {changed} changed{}, {errors} not played",
         plural(cases.len(), "scenario"),
-        if passed > 0 { format!("{passed} {PASSED}, ") } else { String::new() },
         if changed_fails > 0 { format!(" ({changed_fails} of them fail)") } else { String::new() },
     ));
+    if let Some(text) = needed_text(&cases) {
+        output.say(&text);
+    }
     if recorded > 0 {
         output.warn(&format!(
             "{} of {}: played from recorded answers, and no program was asked; that says nothing of the program as it is \
@@ -177,7 +182,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
             serde_json::json!({ "file": case.file, "scenario": case.scenario,
                                 "outcome": outcome, "reason": reason, "recorded": case.by.is_recorded,
                                 "found_with": case.by.found_with,
-                                "plays": case.by.loose_plays.unwrap_or(1) })
+                                "again": case.again })
         })
         .collect();
     output.result(
@@ -188,17 +193,15 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         let in_source = |case: &Case| matches!(case.outcome, Outcome::NotPlayed { in_source: true, .. });
         return Err(Failure::NotPlayed { scenarios: errors, in_source: cases.iter().any(in_source) });
     }
-    match cases.iter().filter(|case| case.outcome.is_failure()).count() {
+    match cases.iter().filter(|case| case.is_failure()).count() {
         0 => Ok(()),
         scenarios => Err(Failure::Failing { scenarios }),
     }
 }
 
-/// Plays again what did not fail in its one play, because the driving system was taken for deterministic.
-fn play_loosely(output: &Output, suite: &Suite, cases: &mut [Case]) -> Result<(), Failure> {
-    let is_open = |case: &&Case| {
-        case.by.loose_plays.is_none() && !case.outcome.is_failure() && case.outcome.was_played()
-    };
+/// Plays again what has not failed, as often as a driving system that is not deterministic needs. Until now it was believed to be.
+fn play_again(output: &Output, suite: &Suite, cases: &mut [Case]) -> Result<(), Failure> {
+    let is_open = |case: &&Case| !case.by.is_mixed && !case.is_failure() && case.outcome.was_played();
     let files: Vec<PathBuf> = cases.iter().filter(is_open).map(|case| case.file.clone()).collect();
     if !files.is_empty() {
         let scenarios = plural(files.len(), "scenario");
@@ -217,9 +220,23 @@ fn play_loosely(output: &Output, suite: &Suite, cases: &mut [Case]) -> Result<()
         again.complete("played")?;
     }
     for case in cases {
-        case.by.loose_plays.get_or_insert(1);
+        case.by.is_mixed = true;
     }
     Ok(())
+}
+
+/// What would tell a pass from a fix, if anything passed.
+fn needed_text(cases: &[Case]) -> Option<String> {
+    let passed = cases.iter().filter(|case| case.in_words().0 == PASSED && !case.by.is_recorded);
+    let needed = |case: &Case| case.again.unwrap_or_default().clean_until_below(case.below);
+    let (most, below) = passed.filter_map(|case| Some((needed(case)?, case.below))).max_by_key(|of| of.0)?;
+    let played = cases.iter().filter_map(|case| case.again).map(|again| again.replays).max().unwrap_or(0);
+    Some(format!(
+        "a pass is no proof: {most} clean replays more under other noise would show that less than {:.0} % fail\n\
+         (`--repeat {}`)",
+        100.0 * below,
+        most + played
+    ))
 }
 
 /// Prints what came of a file.
@@ -294,29 +311,30 @@ impl Suite<'_> {
         let started = now();
         let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let mut notes = Notes::default();
-        let (scenario, road, outcome, by) = match self.open(file, &mut notes) {
+        let (scenario, road, outcome, by, again) = match self.open(file, &mut notes) {
             Ok((Emitted::Policy(..), _)) => return None,
             Ok((Emitted::Scenario(table, scenario), reviewed)) => {
                 let road = table.space().roads[scenario.road].name.clone();
                 let not_played =
                     |error: RunError| Outcome::NotPlayed { reason: error.to_string(), in_source: false };
                 let compared = || self.compare(&table, &scenario).unwrap_or_else(not_played);
-                let mut by = self.by(&scenario);
-                let outcome = match (reviewed, &mut by.loose_plays) {
-                    (Some(reviewed), _) => reviewed,
-                    (None, None) => compared(),
-                    (None, Some(plays)) => self.until_it_fails(&scenario, plays, compared),
+                let by = self.by(&scenario);
+                let outcome = reviewed.unwrap_or_else(compared);
+                let again = match self.most_again(&by, &outcome) {
+                    0 => None,
+                    most => self.again(&table, &scenario, most),
                 };
-                (scenario.name, road, outcome, by)
+                (scenario.name, road, outcome, by, again)
             }
             Err(failure) => {
                 let in_source = matches!(failure, Failure::Source { .. } | Failure::Outdated);
                 let outcome = Outcome::NotPlayed { reason: failure.to_string(), in_source };
-                (name, String::new(), outcome, By::default())
+                (name, String::new(), outcome, By::default(), None)
             }
         };
+        let (file, below) = (file.to_owned(), self.arguments.below);
         let elapsed_s = started.elapsed().as_secs_f64();
-        Some((Case { file: file.to_owned(), scenario, road, outcome, by, elapsed_s }, notes))
+        Some((Case { file, scenario, road, outcome, by, again, below, elapsed_s }, notes))
     }
 
     /// By what a scenario is played.
@@ -332,27 +350,59 @@ impl Suite<'_> {
         By {
             is_recorded: self.asked.is_nothing() && scenario.origin.ads.as_deref() == Some(EXTERNAL),
             found_with: played.filter(|played| *played != found).map(|_| found),
-            loose_plays: program.filter(|program| !program.is_deterministic()).map(|_| 1),
+            is_mixed: program.is_some_and(|program| !program.is_deterministic()),
         }
     }
 
-    /// Plays a scenario with a driving system that need not repeat itself until it fails, as often as a finding is played
-    /// again. `plays` is how often it was.
-    fn until_it_fails(
-        &self,
-        scenario: &Scenario,
-        plays: &mut u32,
-        compared: impl Fn() -> Outcome,
-    ) -> Outcome {
-        let most = if scenario.replays() > 0 { scenario.replays() } else { REPLAYS };
-        let mut outcome = compared();
-        while *plays < most && !outcome.is_failure() && !matches!(outcome, Outcome::NotPlayed { .. }) {
-            // Otherwise it would be taken at its first word.
-            self.asked.external.iter().for_each(|program| program.forget());
-            *plays += 1;
-            outcome = compared();
+    /// How often at most a scenario is played again under other noise.
+    fn most_again(&self, by: &By, outcome: &Outcome) -> u32 {
+        let is_open = matches!(
+            outcome,
+            Outcome::Played(
+                Regression::Fixed { .. } | Regression::StillFails { .. } | Regression::FailsAgain(_)
+            ) | Outcome::Breached { .. }
+        );
+        match self.arguments.repeat {
+            _ if !is_open => 0,
+            Some(most) => most,
+            // One play of a driving system with chance in it says little, unless it fails.
+            None if by.is_mixed && !outcome.is_failure() => REPLAYS,
+            None => 0,
         }
-        outcome
+    }
+
+    /// Plays a scenario under other noise until it is certain whether it fails less often than asked. Any of its findings is a
+    /// failure, and so is one of the driving system itself. `None` if the driving system cannot be asked.
+    fn again(&self, table: &ActionTable, scenario: &Scenario, most: u32) -> Option<Recurrence> {
+        let recorded = run::recorded(scenario).ok()?;
+        let (ads, _) = self.asked.selected_for(scenario).ok()?;
+        let stage = Stage::new(table, scenario).ok()?;
+        let log = stage.play(&recorded, &mut |_, _, _| {});
+        let counted = stage.counted(&recorded, &log);
+        let is_own = |index: &usize| scenario.crashes_with(log.collisions[*index].contact.obstacle);
+        let collisions = counted.into_iter().filter(is_own).map(Found::Collision);
+        let breaches = scenario.breached().filter_map(|requirement| {
+            let is_meant =
+                |breach: &Breach| table.space().requirements[breach.requirement].name == *requirement;
+            log.breaches.iter().position(is_meant).map(Found::Breach)
+        });
+        let findings: Vec<Found> = collisions.chain(breaches).collect();
+        if !oracle::can_replay(&ads) {
+            return None;
+        }
+        let setup = stage.setup(&ads);
+        let replayed = Replayed::new(&setup, &Script::of_scenario(scenario), &log);
+        let below = self.arguments.below;
+        let fails = |play: &EpisodeLog| match findings.is_empty() {
+            _ if play.failure.is_some() => Some(true),
+            // A scenario of a failure of the driving system, which has not failed.
+            true => Some(false),
+            false => replayed.is_again(&findings, play),
+        };
+        let is_certain = |so_far: Recurrence| so_far.is_below(below) || so_far.is_above(below);
+        let found = replayed.failing(fails, is_certain, most);
+        // A driving system that was given up meanwhile drove only some of them.
+        oracle::can_replay(&ads).then_some(found)
     }
 
     /// Reads a file. One whose space has changed is noted, or reviewed; then it may be known already what comes of it.
@@ -539,34 +589,36 @@ impl Case {
     /// One of seven words, and why.
     fn in_words(&self) -> (&'static str, String) {
         let (word, reason) = self.outcome.in_words();
-        let By { is_recorded, found_with, loose_plays } = &self.by;
-        let is_fixed = matches!(self.outcome, Outcome::Played(Regression::Fixed { .. }));
-        let word = match is_fixed {
+        let By { is_recorded, found_with, is_mixed } = &self.by;
+        let is_clean = matches!(self.outcome, Outcome::Played(Regression::Fixed { .. }));
+        let is_below = self.again.is_some_and(|again| again.is_below(self.below));
+        let word = match is_clean {
             // No program was asked, so only avastra can have changed.
             true if *is_recorded => "changed",
-            true if found_with.is_some() || loose_plays.is_some() => PASSED,
+            true if self.again.is_some_and(|again| again.recurred > 0) => "still fails",
+            // That another driving system passes mends nothing.
+            true if found_with.is_some() || !is_below => PASSED,
             _ => word,
         };
         let found_with = found_with.as_ref().filter(|_| word == PASSED);
-        let loosely = loose_plays.map(|plays| match word {
-            PASSED => {
-                let (_, [_, most]) = proportion(0, plays);
-                format!(
-                    "in {plays} of {} of a driving system that is not deterministic: it may still fail in up to {:.0} %",
-                    plural(plays as usize, "play"),
-                    100.0 * most
-                )
-            }
-            _ => format!("in play {plays} of a driving system that is not deterministic"),
+        let again = self.again.map(|again| {
+            let percent = 100.0 * self.below;
+            let less = if is_below { format!(", so in less than {percent:.0} %") } else { String::new() };
+            format!("fails in {again} under other noise{less}{}", mixed_text(*is_mixed))
         });
-        let played = self.outcome.was_played();
         let more = [
             (!reason.is_empty()).then_some(reason),
             found_with.map(|found| format!("found with `{found}`")),
-            loosely.filter(|_| played),
-            (*is_recorded && played).then(|| "by its recorded answers, no program was asked".to_owned()),
+            again,
+            (*is_recorded && self.outcome.was_played())
+                .then(|| "by its recorded answers, no program was asked".to_owned()),
         ];
         (word, more.into_iter().flatten().collect::<Vec<_>>().join("; "))
+    }
+
+    /// Whether the driving system still crashes, in this play or in one under other noise, or is itself what fails.
+    fn is_failure(&self) -> bool {
+        self.outcome.is_failure() || self.in_words().0 == "still fails"
     }
 }
 
@@ -628,13 +680,13 @@ impl Outcome {
 /// The results as JUnit XML, by the schema of Jenkins' xUnit plugin. Scenarios of one name are told apart by their
 /// files.
 fn junit(suite: &str, cases: &[Case]) -> String {
-    let count = |is: fn(&Outcome) -> bool| cases.iter().filter(|case| is(&case.outcome)).count();
+    let count = |is: fn(&Case) -> bool| cases.iter().filter(|case| is(case)).count();
     let counts = format!(
         "tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" time=\"{:.3}\"",
         cases.len(),
-        count(Outcome::is_failure),
-        count(|outcome| matches!(outcome, Outcome::NotPlayed { .. })),
-        count(Outcome::is_skipped),
+        count(Case::is_failure),
+        count(|case| matches!(case.outcome, Outcome::NotPlayed { .. })),
+        count(|case| case.outcome.is_skipped()),
         cases.iter().map(|case| case.elapsed_s).sum::<f64>()
     );
     let name = in_markup(suite);
@@ -647,7 +699,7 @@ fn junit(suite: &str, cases: &[Case]) -> String {
         let reason = in_markup(&reason);
         let element = match &case.outcome {
             Outcome::NotPlayed { .. } => Some("error"),
-            outcome if outcome.is_failure() => Some("failure"),
+            _ if case.is_failure() => Some("failure"),
             outcome if outcome.is_skipped() => Some("skipped"),
             Outcome::Played(_) | Outcome::Breached { .. } | Outcome::Allowed(_) | Outcome::Gone(_) => None,
         };
@@ -685,11 +737,20 @@ mod tests {
             road: "corner".to_owned(),
             outcome,
             by: By::default(),
+            again: None,
+            below: 0.1,
             elapsed_s: 0.25,
         };
         let cases = [
             case("a", Outcome::Played(Regression::StillFails { time_s: 14.221 })),
-            case("b", Outcome::Played(Regression::Fixed { others_crash_s: None })),
+            Case {
+                again: Some(Recurrence { recurred: 0, replays: 53 }),
+                ..case("b", Outcome::Played(Regression::Fixed { others_crash_s: None }))
+            },
+            Case {
+                again: Some(Recurrence { recurred: 2, replays: 20 }),
+                ..case("h", Outcome::Played(Regression::Fixed { others_crash_s: None }))
+            },
             case("c", Outcome::Played(Regression::OtherCrash)),
             case("d", Outcome::Played(Regression::NeverMet)),
             case("f", Outcome::Played(Regression::NotCounted { time_s: 3.0 })),
@@ -707,12 +768,12 @@ mod tests {
         let document = roxmltree::Document::parse(&text).expect(&text);
         let suite = document.root_element().first_element_child().unwrap();
         let counts = ["tests", "failures", "errors", "skipped"].map(|name| suite.attribute(name).unwrap());
-        assert_eq!(counts, ["8", "3", "1", "3"]);
+        assert_eq!(counts, ["9", "4", "1", "3"]);
         assert_eq!(suite.attribute("name"), Some("runs/<1>"));
         let cases = suite.children().filter(|node| node.has_tag_name("testcase"));
         let names: Vec<&str> = cases.filter_map(|case| case.attribute("name")).collect();
-        assert_eq!(names[4..6], ["f (f.ava)", "f (other/f.ava)"]);
+        assert_eq!(names[5..7], ["f (f.ava)", "f (other/f.ava)"]);
         let inside = |name: &str| suite.descendants().filter(|node| node.has_tag_name(name)).count();
-        assert_eq!(["testcase", "failure", "error", "skipped"].map(inside), [8, 3, 1, 3]);
+        assert_eq!(["testcase", "failure", "error", "skipped"].map(inside), [9, 4, 1, 3]);
     }
 }

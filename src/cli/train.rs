@@ -18,7 +18,7 @@ use avastra_lang::syntax::listed;
 use avastra_search::agent::{self, Kind, QPolicy, Settings};
 use avastra_world::action::Draw;
 
-use super::arguments::{REPLAYS, TrainArguments};
+use super::arguments::TrainArguments;
 use super::campaign::{self, Campaign, Outside, as_they_are};
 use super::conditions::{profile_text, roads_or_all};
 use super::error::Failure;
@@ -328,7 +328,7 @@ fn find_recurrence(output: &Output, training: &Training, directory: &mut Directo
             let episode = scenario.origin.episode.unwrap_or(0) as usize;
             let mut summary = EpisodeSummary::judged(&setup, episode, &log);
             summary.find_keepers(&setup, &log);
-            summary.find_recurrence(&setup, &Script::of_scenario(&scenario), &log, REPLAYS);
+            summary.find_recurrence(&setup, &Script::of_scenario(&scenario), &log, oracle::REPLAYS);
             let text = directory.write_critical(&player, (&log, &summary))?;
             directory.write(|database| database.add_recurrence(&summary, table.space(), &text))?;
         }

@@ -28,7 +28,7 @@ def play(avastra, checkout, arguments, folder):
     """Plays a space; returns its database."""
     space, *rest = arguments.split()
     out = os.path.join(folder, "run")
-    command = [avastra, "run", f"scenarios/{space}", "--agent", "random", "--replays", "0", "--quiet", "--out", out, *rest]
+    command = [avastra, "run", f"scenarios/{space}", "--agent", "random", "--repeat", "0", "--quiet", "--out", out, *rest]
     subprocess.run(command, cwd=checkout, check=True, capture_output=True)
     return sqlite3.connect(f"{out}/run.db")
 

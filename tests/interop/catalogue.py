@@ -24,7 +24,7 @@ def played(avastra, file, ads):
     with tempfile.TemporaryDirectory() as out:
         run = Path(out) / "run"
         subprocess.run([avastra, "run", ROOT / f"scenarios/{file}.ava", "--agent", "every-row", "--episodes", str(FILES[file]), "--ads", ads,
-                        "--replays", "0", "--out", run], check=True, capture_output=True)
+                        "--repeat", "0", "--out", run], check=True, capture_output=True)
         with open(run / "protocol.csv", newline="") as table:
             return list(csv.DictReader(table))
 

@@ -419,7 +419,7 @@ def play(program, defect, space, out):
     folder = out / f"{defect}-{space}"
     shutil.rmtree(folder, ignore_errors=True)
     done = subprocess.run(
-        [program, "run", SPACES[space], "--ads", profile, "--episodes", str(episodes), "--replays", "0", "--jobs", "2",
+        [program, "run", SPACES[space], "--ads", profile, "--episodes", str(episodes), "--repeat", "0", "--jobs", "2",
          *DEFECTS[defect][3], "--out", folder, "--format", "json"],
         cwd=ROOT, capture_output=True, text=True, check=False)
     if done.returncode != 0:
@@ -464,7 +464,7 @@ def play_faults(program, out):
             folder = out / fault.stem
             shutil.rmtree(folder, ignore_errors=True)
             told = json.loads(subprocess.run(
-                [program, "run", space, "--ads", fault, "--episodes", "40", "--seed", "7", "--replays", "0", "--out", folder,
+                [program, "run", space, "--ads", fault, "--episodes", "40", "--seed", "7", "--repeat", "0", "--out", folder,
                  "--format", "json"], cwd=ROOT, capture_output=True, text=True, check=True).stdout)
             hit, counted, breached = told["totals"]["collisions"], told["totals"]["counted"], sorted(breaches(told))
             hits, found = hits + hit, found + counted + len(breached)

@@ -36,7 +36,7 @@ def main():
                 print(f"  refused: {file.stem}")
                 continue
             run = out / "run"
-            subprocess.run([avastra, "run", out / f"{file.stem}.ava", "--agent", "every-row", "--ads", ads, "--replays", "0",
+            subprocess.run([avastra, "run", out / f"{file.stem}.ava", "--agent", "every-row", "--ads", ads, "--repeat", "0",
                             "--jobs", jobs, "--out", run], capture_output=True, check=True)
             with open(run / "protocol.csv", newline="") as table:
                 rows = list(csv.DictReader(table))

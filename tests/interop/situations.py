@@ -25,7 +25,7 @@ NEWER = set(open(os.path.join(SITUATIONS, "newer.txt")).read().split())
 def play(avastra, path, out):
     """Plays one situation; returns its contacts and the requirements that were breached."""
     ads = re.search(r"^// ADS: (.*)$", open(path).read(), re.M).group(1)
-    command = [avastra, "run", path, "--agent", "every-row", "--ads", ads, "--jobs", "1", "--replays", "0", "--out", out]
+    command = [avastra, "run", path, "--agent", "every-row", "--ads", ads, "--jobs", "1", "--repeat", "0", "--out", out]
     environment = {**os.environ, "PYTHONPATH": os.path.join(ROOT, "python")}
     done = subprocess.run(command, capture_output=True, text=True, timeout=170, cwd=SITUATIONS, env=environment)
     try:

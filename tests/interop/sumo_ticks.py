@@ -62,7 +62,7 @@ def played(avastra, ambient, episodes):
         out = os.path.join(folder, "run")
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         settings = ["--ads", "idm", "--agent", "none", "--ambient", str(ambient), "--episodes", str(episodes)]
-        subprocess.run([avastra, "run", "scenarios/avastra45.ava", *settings, "--replays", "0", "--keep", "0", "--jobs", "1", "--out", out],
+        subprocess.run([avastra, "run", "scenarios/avastra45.ava", *settings, "--repeat", "0", "--keep", "0", "--jobs", "1", "--out", out],
                        check=True, capture_output=True)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         table = sqlite3.connect(os.path.join(out, "run.db"))

@@ -102,7 +102,7 @@ fn each_of_the_37_pre_crash_types_happens_in_the_row_that_has_its_number() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let out = scratch.path().join("run").display().to_string();
     let space = root().join("scenarios/catalogue/pre_crash.ava").display().to_string();
-    done(&["run", &space, "--agent", "every-row", "--replays", "0", "--ads", "blind", "--out", &out]);
+    done(&["run", &space, "--agent", "every-row", "--repeat", "0", "--ads", "blind", "--out", &out]);
     let table = std::fs::read_to_string(format!("{out}/protocol.csv")).expect("it was written");
     let head: Vec<&str> = table.lines().next().expect("it has a head").split(',').collect();
     let column = |name: &str| head.iter().position(|known| *known == name).expect("it is a column");
@@ -128,7 +128,7 @@ fn a_template_of_the_catalogue_is_played_row_by_row() {
     let out = scratch.path().join("run").display().to_string();
     let space = format!("{folder}/euro_ncap_vulnerable.ava");
     let said =
-        done(&["run", &space, "--agent", "every-row", "--replays", "0", "--road", "left_10", "--out", &out]);
+        done(&["run", &space, "--agent", "every-row", "--repeat", "0", "--road", "left_10", "--out", &out]);
     // Its rows on that road: two of `cpta`, three of `cmftap`.
     assert!(said.contains("5 episodes on left_10"), "{said}");
     assert_eq!(

@@ -381,12 +381,12 @@ fn a_run_fails_on_what_is_asked_for() {
     let (status, told) = run("recurring", &some);
     assert!(status == 4 && told.contains(" under other noise"), "{status}: {told}");
     // Some of those stalled after a crash, which does not count as such. Here one got stuck by itself.
-    let stuck = ["--ads", FLICKER, "--road", "crossroad", "--episodes", "25", "--replays", "0"];
+    let stuck = ["--ads", FLICKER, "--road", "crossroad", "--episodes", "25", "--repeat", "0"];
     let (status, told) = run("stalled", &[&stuck[..], &["--fail-on", "stalled"]].concat());
     assert!(status == 4 && told.contains("got stuck in 1 episode"), "{status}: {told}");
     // Nothing is begun that cannot be judged so.
     for (more, reason) in [
-        (&["--replays", "0", "--fail-on", "recurring"][..], "needs replays"),
+        (&["--repeat", "0", "--fail-on", "recurring"][..], "needs replays"),
         (&["--fail-on", "breach"], "needs a requirement"),
     ] {
         let (status, told) = run("none", more);

@@ -25,7 +25,7 @@ fn each_row_is_played_once_whoever_plays_it() {
     let run = |name: &str, more: &[&str]| {
         let out = scratch.path().join(name);
         let told = out.display().to_string();
-        let wanted = ["run", &space, "--agent", "every-row", "--replays", "0", "--out", &told];
+        let wanted = ["run", &space, "--agent", "every-row", "--repeat", "0", "--out", &told];
         (done(&[&wanted, more].concat()), out)
     };
     let (said, one) = run("one", &["--jobs", "1"]);
@@ -73,7 +73,7 @@ fn a_protocol_outlives_its_driving_system() {
         let out = scratch.path().join(how).display().to_string();
         let toy =
             format!("'{}' ads toy --misbehave {how}", assert_cmd::cargo::cargo_bin("avastra").display());
-        let run = ["run", &space, "--agent", "every-row", "--replays", "0", "--ads", &toy, "--out", &out];
+        let run = ["run", &space, "--agent", "every-row", "--repeat", "0", "--ads", &toy, "--out", &out];
         let (status, stdout, stderr) = outcome(&mut avastra(&run));
         assert_eq!(status, 5, "{how}: {stderr}");
         assert!(stdout.contains("driving system failed"), "{how}: {stdout}");
@@ -89,7 +89,7 @@ fn a_page_has_heat_maps_by_parameters() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let space = space(scratch.path());
     let out = scratch.path().join("run").display().to_string();
-    done(&["run", &space, "--agent", "every-row", "--replays", "0", "--out", &out]);
+    done(&["run", &space, "--agent", "every-row", "--repeat", "0", "--out", &out]);
     let page = |more: &[&str]| {
         let said = done(&[&["report", &out], more].concat());
         (said, read(Path::new(&out), "report.html"))
@@ -112,7 +112,7 @@ fn a_page_has_heat_maps_by_parameters() {
         "corner",
         "--episodes",
         "3",
-        "--replays",
+        "--repeat",
         "0",
         "--out",
         &other,
@@ -157,7 +157,7 @@ fn a_row_stands_under_its_own_name_whatever_comes_before_it() {
     let (space, out) = (space.display().to_string(), scratch.path().join("run"));
     let told = out.display().to_string();
     let arguments =
-        ["run", &space, "--agent", "every-row", "--replays", "0", "--ads", "blind", "--out", &told];
+        ["run", &space, "--agent", "every-row", "--repeat", "0", "--ads", "blind", "--out", &told];
     done(&arguments);
     let table = read(&out, "protocol.csv");
     let of = |action: &str| {

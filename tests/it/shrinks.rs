@@ -12,7 +12,7 @@ fn each_part_of_a_scenario_is_made_smaller_or_plainer() {
     let out = scratch.path().join("run").display().to_string();
     let space = root().join("tests/cases/spaces/shrinkable.ava").display().to_string();
     let run = ["run", &space, "--ads", "blind", "--episodes", "12", "--seed", "3", "--ambient", "3"];
-    done(&[&run[..], &["--replays", "6", "--out", &out]].concat());
+    done(&[&run[..], &["--repeat", "8", "--out", &out]].concat());
 
     let found = files(format!("{out}/critical"), "ava");
     let delayed = found.iter().filter(|path| delay_last_step(path)).count();
@@ -27,7 +27,7 @@ fn what_a_breach_needs_is_kept() {
     let space = root().join("tests/cases/spaces/shrinkable_breaches.ava").display().to_string();
     let found = |name: &str, settings: &[&str]| {
         let out = scratch.path().join(name).display().to_string();
-        let run = ["run", &space, "--ads", "blind", "--seed", "3", "--replays", "6", "--out", &out];
+        let run = ["run", &space, "--ads", "blind", "--seed", "3", "--repeat", "8", "--out", &out];
         done(&[&run[..], settings].concat());
         files(format!("{out}/critical"), "ava")
     };

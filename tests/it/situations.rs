@@ -109,7 +109,7 @@ fn play(path: &Path) -> Said {
         "blind",
         "--jobs",
         "1",
-        "--replays",
+        "--repeat",
         "0",
     ]);
     command.arg("--out").arg(&run).output().expect("it runs");
@@ -182,7 +182,7 @@ fn runs_of_careless_drivers_are_judged_as_before() {
         let out = out.path().join("run").display().to_string();
         let file = format!("scenarios/{space}.ava");
         let run = ["run", &file, "--ads", ads, "--episodes", episodes, "--ambient", ambient, "--seed", "1"];
-        done(&[&run[..], &["--replays", "0", "--out", &out]].concat());
+        done(&[&run[..], &["--repeat", "0", "--out", &out]].concat());
         let database = Connection::open_with_flags(format!("{out}/run.db"), OpenFlags::SQLITE_OPEN_READ_ONLY);
         expect_snapshot("situations", name, &in_full(&database.expect("it was written")));
     }

@@ -108,7 +108,7 @@ fn a_scenario_of_two_crashes_is_mended_when_both_are_gone() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let path = |name: &str| scratch.path().join(name).display().to_string();
     let space = root().join("tests/cases/spaces/two_crashes.ava").display().to_string();
-    done(&["run", &space, "--ads", "blind", "--episodes", "1", "--replays", "0", "--out", &path("run")]);
+    done(&["run", &space, "--ads", "blind", "--episodes", "1", "--repeat", "0", "--out", &path("run")]);
     let slow = "{perception: {detection_chance_max: 0, plenty_m: 0, ghosts_per_s: 0}, \
                 planning: {cruise_mps: 9, sight_bounds_speed: false}}";
     std::fs::write(path("slow.yaml"), slow).expect("it is writable");
@@ -387,7 +387,7 @@ fn a_suite_is_judged_by_the_verdict_of_its_space() {
     let told = test(&["--jobs", "1"]);
     let all = told.lines().filter(|line| line.starts_with("still fails")).count();
     assert!(
-        all > 0 && told.contains(&format!(": {all} still fail, 0 fixed, 0 changed, 0 not played")),
+        all > 0 && told.contains(&format!(": {all} still fail, 0 fixed, 0 passed, 0 changed, 0 not played")),
         "{told}"
     );
     assert_eq!(test(&["--jobs", "3"]), told);

@@ -115,7 +115,7 @@ fn a_test_whose_road_users_crash_into_each_other_is_no_success() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let out = scratch.path().join("run");
     let told = out.display().to_string();
-    let said = done(&["run", &case("wreck"), "--agent", "every-row", "--replays", "0", "--out", &told]);
+    let said = done(&["run", &case("wreck"), "--agent", "every-row", "--repeat", "0", "--out", &told]);
     assert!(said.contains("1 others crashed"), "{said}");
     assert!(said.contains("other road users crashed into each other in 1 episode"), "{said}");
     let table = read(&out, "protocol.csv");

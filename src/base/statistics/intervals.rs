@@ -91,6 +91,32 @@ pub fn wilson(count: u32, trials: u32) -> (f64, f64) {
     (low, high)
 }
 
+/// Half a success and half a failure, seen before the first trial (Krichevsky and Trofimov 1981).
+const PRIOR: f64 = 0.5;
+
+/// 95 % interval of a share by its count, for a test that looks after each trial and stops when it has seen enough; from 0 to 1
+/// without trials.
+///
+/// The share lies in all of these intervals at once in 95 of 100 tests, however many trials they take (a confidence sequence,
+/// Robbins 1970). So the moment at which a test stops cannot make it wrong.
+pub fn sequential(count: u32, trials: u32) -> [f64; 2] {
+    let is_out = |share: f64| sequential_excludes(count, trials, share);
+    let observed = if trials == 0 { 0.5 } else { f64::from(count) / f64::from(trials) };
+    let low = if count == 0 { 0.0 } else { bisect(0.0, observed, |share| !is_out(share)) };
+    let high = if count == trials { 1.0 } else { bisect(observed, 1.0, is_out) };
+    [low, high]
+}
+
+/// Whether a share lies outside of the interval of [`sequential`]. The trials are then 20 times less likely under it than under
+/// the mixture of all shares after Krichevsky and Trofimov (Ville's inequality).
+pub fn sequential_excludes(count: u32, trials: u32, share: f64) -> bool {
+    let (successes, failures) = (f64::from(count), f64::from(trials - count));
+    let beta = |a: f64, b: f64| libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b);
+    let mixed = beta(successes + PRIOR, failures + PRIOR) - beta(PRIOR, PRIOR);
+    let power = |exponent: f64, base: f64| if exponent == 0.0 { 0.0 } else { exponent * libm::log(base) };
+    mixed - power(successes, share) - power(failures, 1.0 - share) >= libm::log(20.0)
+}
+
 /// The exact interval of a probability, of which `count` was observed in `trials` (Clopper and Pearson 1934); from 0 to 1
 /// without trials.
 pub fn binomial(count: u64, trials: u64) -> Interval {
@@ -309,6 +335,38 @@ mod tests {
         assert_eq!(mean(&[4.0]).unwrap().interval, None);
         assert_eq!(mean(&[0.0, 0.0, 0.0]).unwrap().interval, None);
         assert_eq!(mean(&[]), None);
+    }
+
+    /// Every way of a test of 400 trials, by its exact probability.
+    #[test]
+    fn a_sequential_interval_misses_the_share_at_most_in_one_of_twenty_tests() {
+        for share in [0.05, 0.1, 0.2, 0.5, 0.9] {
+            // The probability of each count, of the tests that have not missed so far.
+            let (mut by_count, mut missed) = (vec![1.0], 0.0);
+            for trials in 1..=400_u32 {
+                let before = by_count;
+                by_count = vec![0.0; trials as usize + 1];
+                for (count, probability) in before.into_iter().enumerate() {
+                    by_count[count] += probability * (1.0 - share);
+                    by_count[count + 1] += probability * share;
+                }
+                for (count, probability) in by_count.iter_mut().enumerate().filter(|(_, of)| **of > 1e-12) {
+                    let [low, high] = sequential(count as u32, trials);
+                    if share < low || share > high {
+                        missed += core::mem::take(probability);
+                    }
+                }
+            }
+            assert!(missed > 0.005 && missed < 0.05, "{share}: {missed}");
+        }
+    }
+
+    #[test]
+    fn a_sequential_interval_closes_in_on_the_share() {
+        assert_eq!(sequential(0, 0), [0.0, 1.0]);
+        let rounded = |count, trials| sequential(count, trials).map(|end| (1000.0 * end).round() / 1000.0);
+        assert_eq!([rounded(0, 7), rounded(7, 7)], [[0.0, 0.479], [0.521, 1.0]]);
+        assert_eq!([rounded(7, 20), rounded(350, 1000)], [[0.097, 0.686], [0.296, 0.406]]);
     }
 
     /// Bisection over tails summed with exact binomial coefficients.

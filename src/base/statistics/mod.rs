@@ -18,7 +18,7 @@ mod survival;
 
 pub use intervals::{
     Estimate, Interval, binomial, binomial_missing, mean, paired_difference, poisson, proportion,
-    ratio_of_means, variance_of_mean, weighted, wilson,
+    ratio_of_means, sequential, sequential_excludes, variance_of_mean, weighted, wilson,
 };
 pub use ranks::{PairedTest, RankTest, holm, mann_whitney, sign_test, signed_ranks, superiority};
 pub use survival::{Lifetime, restricted_mean};

@@ -321,8 +321,10 @@ fn headline_of(space: &Space, log: &EpisodeLog, summary: &EpisodeSummary, about:
         }
     };
     let program = log.conversation.as_deref().map(|conversation| &conversation.attached);
-    let mixed = mixed_text(program.is_some_and(|attached| !attached.is_deterministic()));
-    let again = |of| format!("{what} It recurs in {of} under other noise{mixed}.");
+    let is_mixed = program.is_some_and(|attached| !attached.is_deterministic());
+    let again = |of: Recurrence| {
+        format!("{what} It {}: {of} under other noise{}.", of.word(is_mixed), mixed_text(is_mixed))
+    };
     summary.recurrence_of(log, about).map_or_else(|| what.clone(), again)
 }
 

@@ -33,7 +33,7 @@ pub use measured::Measure;
 pub use mechanisms::{
     MechanismShare, Mechanisms, Share, WithoutMechanism, mechanism_shares, mechanisms, placebo,
 };
-pub use recurrence::{MIXED, Recurrence, Replayed, can_replay, mixed_text};
+pub use recurrence::{MIXED, REPLAYS, Recurrence, Replayed, can_replay, mixed_text};
 pub use severity::{Harm, Severity, severity};
 pub use shrink::{Shrunk, Worth, shrink, spare_steps};
 pub use variation::{Likelihood, likelihood};

@@ -7,9 +7,9 @@
 //! verdict must also still count it, or still not. A breach is the same if it is one of the same requirement, and a careful
 //! driver still keeps that, or still none does.
 //!
-//! It must recur, too, as far as that was tried. A smaller candidate may recur less often, down to the lower end of the 95 %
-//! interval of what is shrunk, and what recurs (`Recurrence::recurs`) still does. For a rounder number nothing is traded: it
-//! recurs as often as what is shrunk, and is no softer than the best candidate so far. Replays come last and stop as soon as
+//! It must recur, too, as far as that was tried. What recurs (`Recurrence::recurs`) still does. What does not may recur less
+//! often, down to the lower end of its 95 % interval. For a rounder number nothing is traded: it recurs as often as what is
+//! shrunk, and is no softer than the best candidate so far. Replays come last and stop as soon as
 //! they have decided, because most candidates fail the cheap checks. The result is 1-minimal: if any one step is removed, or
 //! replaced by waiting, the crash is gone, is another one, or recurs too rarely.
 
@@ -24,7 +24,7 @@ use super::avoidable::{Judgement, judge};
 use super::case::Found;
 use super::counted::counts;
 use super::kept::breached;
-use super::recurrence::{Recurrence, Replayed, recurs_in};
+use super::recurrence::{Recurrence, Replayed};
 use super::severity::severity;
 
 /// Most rounds of all passes. Each round makes something smaller or plainer; most crashes need two.
@@ -103,7 +103,7 @@ impl Worth {
 }
 
 /// Shrinks what led to a finding in a log that was played from `setup`; `judgements` has one for each collision. Recurrence is
-/// tried in `replays` replays, 0 if it may fall.
+/// tried in at most `replays` replays, 0 if it may fall.
 pub fn shrink(
     setup: &Setup,
     log: &EpisodeLog,
@@ -141,7 +141,7 @@ pub fn shrink(
 }
 
 /// Steps that are not needed for the nth collision of a log. Each alone could be removed, or replaced by waiting: the
-/// collision stays the same, and its recurrence in `replays` replays within its interval. Empty if the scenario is
+/// collision stays the same, and recurs as it must, tried in at most `replays` replays. Empty if the scenario is
 /// 1-minimal.
 pub fn spare_steps(
     setup: &Setup,
@@ -263,8 +263,9 @@ impl<'a> Search<'a> {
         }
         let Search { setup, log, found, replays, .. } = *self;
         // With all steps of the file, as its claim was made: another finding may come later.
-        let recurrence = Replayed::new(setup, &Script::of_log(log), log, replays).recurrence(found, replays);
-        self.plays += replays;
+        let again = Replayed::new(setup, &Script::of_log(log), log);
+        let recurrence = again.tested(found, replays);
+        self.plays += again.plays();
         self.recurrence = Some(recurrence);
         recurrence
     }
@@ -295,19 +296,18 @@ impl<'a> Search<'a> {
             return true;
         }
         let recurrence = self.recurrence();
-        let needed = match purpose {
-            Purpose::Size => {
-                let lowest = (recurrence.interval()[0] * f64::from(recurrence.replays)).ceil() as u32;
-                let still_recurs = |recurred: &u32| Recurrence { recurred: *recurred, ..recurrence }.recurs();
-                (lowest..=recurrence.recurred)
-                    .find(|recurred| !recurrence.recurs() || still_recurs(recurred))
-                    .unwrap_or(recurrence.recurred)
-            }
-            Purpose::Roundness => recurrence.recurred,
-        };
         let setup = self.begin(candidate);
-        let (holds, plays) = recurs_in(&setup, script, (&kept.log, kept.found), needed, self.replays);
-        self.plays += plays;
+        let again = Replayed::new(&setup, script, &kept.log);
+        let Recurrence { recurred, replays } = recurrence;
+        let holds = match purpose {
+            Purpose::Size if recurrence.recurs() => again.tested(kept.found, self.replays).recurs(),
+            Purpose::Size => {
+                let lowest = (recurrence.interval()[0] * f64::from(replays)).ceil() as u32;
+                again.is_again_in(kept.found, lowest, replays)
+            }
+            Purpose::Roundness => again.is_again_in(kept.found, recurred, replays),
+        };
+        self.plays += again.plays();
         holds
     }
 

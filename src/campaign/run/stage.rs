@@ -1,12 +1,13 @@
 //! An emitted scenario played again, and its claims checked.
 
-use std::cell::LazyCell;
 use std::sync::Arc;
 
 use crate::episode;
 use crate::episode::{Breach, EpisodeLog, Script, Watch};
 use crate::oracle;
-use crate::oracle::{ClaimResult, Found, Judgement, NoModules, NoTries, Replayed, Replays, can_replay};
+use crate::oracle::{
+    ClaimResult, Found, Judgement, NoModules, NoTries, REPLAYS, Recurrence, Replayed, Replays, can_replay,
+};
 use avastra_drivers::{ModularConfig, Selected};
 use avastra_lang::model::{Claim, RulesInForce, Scenario, digest_text};
 use avastra_search::mdp::ProcKind;
@@ -64,6 +65,19 @@ impl<'a> Stage<'a> {
             period_shifts: Vec::new(),
             proc: ProcKind::default(),
         }
+    }
+
+    /// Most replays of a test whether its findings recur, as far as its claims tell; 0 without such a claim. A test that was sure
+    /// early claims few replays, and had more.
+    pub fn most_replays(&self) -> u32 {
+        let most = self.scenario.claims.iter().map(|claim| match claim {
+            Claim::Recurrence { recurred, replays, .. } => {
+                let known = Recurrence { recurred: *recurred, replays: *replays };
+                if known.is_settled(REPLAYS) { REPLAYS.max(*replays) } else { *replays }
+            }
+            _ => 0,
+        });
+        most.max().unwrap_or(0)
     }
 
     /// Plays it as it is written down.
@@ -136,7 +150,7 @@ impl<'a> Stage<'a> {
         let judgements = self.judge(ads, log);
         let script = Script::of_scenario(self.scenario);
         // Played once, for all claims that need it.
-        let again = LazyCell::new(|| Replayed::new(&setup, &script, log, self.scenario.replays()));
+        let again = Replayed::new(&setup, &script, log);
         let replays = Replays {
             recurrence: &|found, replays| match can_replay(ads) {
                 true => Ok(again.recurrence(found, replays)),
@@ -150,8 +164,7 @@ impl<'a> Stage<'a> {
                 if ads.program().is_some_and(|program| !program.can_start()) {
                     return Err(NoTries);
                 }
-                let replays = self.scenario.replays();
-                Ok(oracle::spare_steps(&setup, log, index, &judgements, replays))
+                Ok(oracle::spare_steps(&setup, log, index, &judgements, self.most_replays()))
             },
         };
         oracle::verify(self.table.space(), self.scenario, log, &judgements, &replays)

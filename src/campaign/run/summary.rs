@@ -121,23 +121,31 @@ impl EpisodeSummary {
         of_collisions.max(log.breaches.iter().map(|breach| breach.step).max())
     }
 
-    /// Plays the scenario of the log `replays` times more, to find how often every counted collision and a breach of every
-    /// breached requirement happens again. Says nothing if the driving system cannot be asked.
-    pub fn find_recurrence(&mut self, setup: &Setup, script: &Script, log: &EpisodeLog, replays: u32) {
-        if replays == 0 || self.last_step(log).is_none() || !can_replay(&setup.ads) {
+    /// Tests whether every counted collision, and a breach of every breached requirement, recurs. The scenario of the log is
+    /// played at most `most` times more. Says nothing if the driving system cannot be asked.
+    pub fn find_recurrence(&mut self, setup: &Setup, script: &Script, log: &EpisodeLog, most: u32) {
+        if most == 0 || self.last_step(log).is_none() || !can_replay(&setup.ads) {
             return;
         }
-        let again = Replayed::new(setup, script, log, replays);
+        let again = Replayed::new(setup, script, log);
+        let counted = self.collisions.iter().filter(|finding| finding.counted);
+        let collisions: Vec<_> =
+            counted.map(|finding| again.tested(Found::Collision(finding.number), most)).collect();
+        let first = |found: &Breached| {
+            let first = log.breaches.iter().position(|breach| breach.requirement == found.requirement)?;
+            Some(again.tested(Found::Breach(first), most))
+        };
+        let breaches: Vec<_> = self.breached.iter().map(first).collect();
         // A driving system that was given up meanwhile drove only some of them.
         if !can_replay(&setup.ads) {
             return;
         }
-        for finding in self.collisions.iter_mut().filter(|finding| finding.counted) {
-            finding.recurrence = Some(again.recurrence(Found::Collision(finding.number), replays));
+        let counted = self.collisions.iter_mut().filter(|finding| finding.counted);
+        for (finding, recurrence) in counted.zip(collisions) {
+            finding.recurrence = Some(recurrence);
         }
-        for found in &mut self.breached {
-            let first = log.breaches.iter().position(|breach| breach.requirement == found.requirement);
-            found.recurrence = first.map(|first| again.recurrence(Found::Breach(first), replays));
+        for (found, recurrence) in self.breached.iter_mut().zip(breaches) {
+            found.recurrence = recurrence;
         }
     }
 

@@ -8,11 +8,9 @@ use clap::{Args, ValueEnum};
 use super::language::RuleArguments;
 use crate::cli::help::Named;
 use avastra_campaign::estimate::Method;
+use avastra_campaign::oracle::REPLAYS;
 use avastra_campaign::run::Shard;
 use avastra_search::agent::Face;
-
-/// Replays of a finding where nothing else is asked for.
-pub const REPLAYS: u32 = 20;
 
 /// The driving system under test.
 #[derive(Debug, Args)]
@@ -78,9 +76,9 @@ pub struct RunArguments {
     /// replays for each.
     #[arg(long)]
     pub causes: bool,
-    /// Replays of each finding with other sensor errors, and others who react a little sooner or later, to say how often it
-    /// recurs; 0 for none.
-    #[arg(long, value_name = "N", default_value_t = REPLAYS, value_parser = clap::value_parser!(u32).range(0..=i64::from(avastra_lang::model::REPLAYS_MAX)))]
+    /// Play each finding up to N times more with other sensor errors, and others who react a little sooner or later, to say
+    /// whether it recurs; 0 for never. It stops once that is certain.
+    #[arg(long = "repeat", value_name = "N", default_value_t = REPLAYS, value_parser = clap::value_parser!(u32).range(0..=i64::from(avastra_lang::model::REPLAYS_MAX)))]
     pub replays: u32,
     /// Keep N episodes in which nothing was found as scenarios in `kept`, too: first those with a collision that does not count,
     /// then the nearest misses [default: 3 if a run of an embedded driving system found nothing, else 0].

@@ -8,7 +8,7 @@ mod scenarios;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-pub use drive::{ConditionArguments, EstimateArguments, FailOn, MergeArguments, REPLAYS, RunArguments};
+pub use drive::{ConditionArguments, EstimateArguments, FailOn, MergeArguments, RunArguments};
 pub use external::{AdsArguments, AdsCheckArguments, AdsCommand, Misbehaviour, ToyAnswer, ToyArguments};
 pub use language::{
     CheckArguments, CompileArguments, CompletionsArguments, DiffArguments, Dump, EditorFilesArguments,

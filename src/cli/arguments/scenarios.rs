@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use avastra_exchange::import::{VARIATIONS_MAX, VARIATIONS_USUAL};
+use avastra_lang::model::REPLAYS_MAX;
 use clap::{Args, ValueEnum};
 
 use crate::cli::help::Named;
@@ -30,6 +31,9 @@ pub struct AgainstArguments {
 pub struct ReplayArguments {
     #[command(flatten)]
     pub against: AgainstArguments,
+    /// Play each scenario up to N times more under other noise, and say of each finding whether it recurs.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(REPLAYS_MAX)))]
+    pub repeat: u32,
     #[command(flatten)]
     pub many: FilesArguments,
 }
@@ -69,6 +73,10 @@ pub struct ShrinkArguments {
     pub output: Option<PathBuf>,
     #[command(flatten)]
     pub against: AgainstArguments,
+    /// Test in up to N plays under other noise whether what recurs still does; 0 to let that go [default: 20 if the scenario
+    /// claims a recurrence, else 0].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(REPLAYS_MAX)))]
+    pub repeat: Option<u32>,
     #[command(flatten)]
     pub many: FilesArguments,
 }
@@ -153,12 +161,27 @@ pub struct TestArguments {
     pub accept: bool,
     #[command(flatten)]
     pub against: AgainstArguments,
+    /// Play each scenario up to N times more under other noise: it is `fixed` once its rate of failures is certainly below
+    /// `--below` [default: 20 with a program that is not deterministic, else 0].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(REPLAYS_MAX)), conflicts_with_all = ["review", "accept"])]
+    pub repeat: Option<u32>,
+    /// The rate of failures below which a scenario is fixed, with 95 %.
+    #[arg(long, value_name = "RATE", default_value_t = 0.1, value_parser = rate)]
+    pub below: f64,
     /// Write the results as JUnit XML, too.
     #[arg(long, value_name = "FILE")]
     pub junit: Option<PathBuf>,
     /// Worker threads over files [default: one for each core].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
+}
+
+/// A rate that a test can be sure of.
+fn rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(rate) if (0.001..=0.5).contains(&rate) => Ok(rate),
+        _ => Err("a rate from 0.001 to 0.5 is due".to_owned()),
+    }
 }
 
 #[derive(Debug, Args)]

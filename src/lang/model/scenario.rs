@@ -192,15 +192,6 @@ impl Scenario {
         self.claims.iter().find(is_found).is_some_and(|claim| matches!(claim, Claim::Breach { .. }))
     }
 
-    /// The replays that its claims of recurrence are about; 0 without one.
-    pub fn replays(&self) -> u32 {
-        let replays = self.claims.iter().map(|claim| match claim {
-            Claim::Recurrence { replays, .. } => *replays,
-            _ => 0,
-        });
-        replays.max().unwrap_or(0)
-    }
-
     /// Whether a crash with an obstacle is one that the scenario is about. If claims name a `counted` obstacle, only those
     /// obstacles matter. Otherwise the obstacles matter that its claims say are hit. Without either claim, any obstacle
     /// matters.

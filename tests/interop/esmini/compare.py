@@ -76,7 +76,7 @@ def ours(avastra, file, out):
         return None
     space = out / f"{file.stem}.ava"
     driver = f"{sys.executable} {HERE / 'blind.py'}"
-    run = [avastra, "run", space, "--ads", driver, "--agent", "random", "--episodes", "1", "--keep", "1", "--replays", "0",
+    run = [avastra, "run", space, "--ads", driver, "--agent", "random", "--episodes", "1", "--keep", "1", "--repeat", "0",
            "--jobs", "1", "--out", out / "run"]
     done = subprocess.run(run, capture_output=True, text=True, check=False)
     found = list((out / "run").glob("critical/*.ava")) + list((out / "run").glob("kept/*.ava"))

@@ -29,7 +29,7 @@ WANTED = {
 def breaches(what, episodes, out):
     """By requirement: how often it was breached, in how many episodes, and a scenario."""
     command = [AVASTRA, "run", "scenarios/avastra45_law.ava", "--ads", f"python3 tests/interop/law/driver.py {what}"]
-    command += ["--agent", "random-raw", "--replays", "0", "--episodes", str(episodes), "--seed", SEED, "--ambient", "12", "--out", str(out), "--format", "json"]
+    command += ["--agent", "random-raw", "--repeat", "0", "--episodes", str(episodes), "--seed", SEED, "--ambient", "12", "--out", str(out), "--format", "json"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     lines = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
     if done.returncode not in (0, 4) or not lines:
