@@ -115,6 +115,7 @@ report runs/0001 --ads cc # beside UN R157's careful driver
 render runs/0001/critical/corner_0004.ava --strip # the seconds up to the crash
 render runs/0001/critical/corner_0004.ava --at 12.5 -o moment.svg
 ads check --ads './my_planner --fast' # does it follow the protocol?
+ads check --drive --ads ./my_planner # does it keep the law alone on the road, is its adapter sound?
 ads check --ads tcp:127.0.0.1:5555 # one that listens on a socket
 ads schema # JSON Schema of every message
 ads check --ads 'avastra ads toy --misbehave nan' # what a finding looks like

@@ -136,6 +136,7 @@ run
 ads check
   checks[] object `stage`, `passed`, what was `found`, the `failure` if it is one of the protocol
   speed object? `questions`, `round_trips_per_s` and `share` of the episode's time
+  drives[] object with `--drive`, alone and among vehicles (`ambient`): `drives`, those that `arrived` or `ended` otherwise, `counted` of the `collisions`, the `breaches` of requirements with their first place; medians and 99 of 100 of the offset from the route (`beside_m`) and of what was done after 1 s against what was asked (`astray_m`, `off_mps`)
 ads schema
   protocol object the JSON Schema of every message
 train

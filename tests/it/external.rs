@@ -387,6 +387,21 @@ fn a_check_passes_for_every_kind_of_answer_and_finds_what_remembers() {
         assert_eq!(result["checks"].as_array().map(Vec::len), Some(6), "{result}");
         assert!(result["speed"]["round_trips_per_s"].as_f64() > Some(100.0), "{result}");
     }
+    // It passes red lights. The check sees that in drives alone, where nothing excuses it.
+    let toy = format!("'{program}' ads toy --answer trajectory");
+    let drives = ["ads", "check", "--format", "json", "--drive=1", "--road", "corner", "--ads", &toy];
+    let (status, stdout, _) = outcome(&mut avastra(&drives));
+    let result = last_line(&stdout);
+    let stages: Vec<&Value> = result["checks"].as_array().expect("a list")[6..].iter().collect();
+    assert_eq!((status, &stages[0]["stage"], &stages[0]["passed"]), (5, &"alone".into(), &false.into()));
+    assert_eq!((&stages[1]["stage"], &stages[1]["passed"]), (&"traffic".into(), &true.into()));
+    let alone = &result["drives"][0];
+    assert_eq!(
+        (&alone["drives"], &alone["arrived"], &alone["collisions"]),
+        (&1.into(), &1.into(), &0.into())
+    );
+    assert_eq!(alone["breaches"]["stops_at_red"]["times"], 1, "{alone}");
+    assert!(alone["astray_m"]["median"].as_f64() < Some(0.5) && alone["off_mps"].is_null(), "{alone}");
     for (how, stage) in [
         ("forgetful", "reset"),
         ("crash-at-reset", "reset"),

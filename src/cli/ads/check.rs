@@ -11,7 +11,7 @@ use crate::cli::arguments::AdsCheckArguments;
 use crate::cli::clock::now;
 use crate::cli::error::Failure;
 use crate::cli::files::{Scratch, make_way, write_new};
-use crate::cli::findings::cut_off;
+use crate::cli::findings::{cut_off, thinking_text};
 use crate::cli::load;
 use crate::cli::new::SHIPPED;
 use crate::cli::output::Output;
@@ -23,8 +23,10 @@ use avastra_search::agent::{self, Kind};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::World;
 
-/// The space that is driven if none is named, and its name.
-const SPACE: &str = "avastra45.ava";
+use super::drive::{Drives, drive};
+
+/// The space that is driven if none is named: one of avastra's own, under the law.
+const SPACE: (&str, &str) = ("drive.ava", "language 1\nuse \"avastra45.ava\"\nuse \"law.ava\"\n");
 /// Length of each of the four episodes, in steps of an agent (6 s), at most.
 const STEPS: usize = 5;
 /// Steps of the episode that is broken off for a reset.
@@ -34,14 +36,14 @@ const STDERR_LINES: usize = 12;
 
 /// The result of one check.
 #[derive(Debug, Serialize)]
-struct Part {
-    /// In a word: `start`, `episode`, `reset`, `process`, `orders`, `close`.
-    stage: &'static str,
-    passed: bool,
+pub(super) struct Part {
+    /// In a word: `start`, `episode`, `reset`, `process`, `orders`, `close`; of drives `alone`, `traffic`.
+    pub stage: &'static str,
+    pub passed: bool,
     /// The finding, in words.
-    found: String,
+    pub found: String,
     #[serde(skip_serializing_if = "Option::is_none")]
-    failure: Option<Finding>,
+    pub failure: Option<Finding>,
 }
 
 /// Figures of the first episode.
@@ -76,14 +78,20 @@ pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failu
     };
     let mut checks =
         Checks { output, seed: arguments.seed, parts: Vec::new(), speed: None, is_deterministic: true };
-    checks.all(table, &road, settings)?;
+    checks.all(table.clone(), &road, settings.clone())?;
+    let drives = match arguments.drive {
+        Some(times) if checks.parts.iter().all(|part| part.passed) => {
+            checks.drives(table, &arguments.road, settings, times)?
+        }
+        _ => Vec::new(),
+    };
     let Checks { parts, speed, .. } = checks;
     let failed = parts.iter().filter(|part| !part.passed).count();
     output.say(match failed {
         0 => "\nit can be put under test",
         _ => "\nit cannot be put under test as it is",
     });
-    output.result(serde_json::json!({ "checks": parts, "speed": speed }));
+    output.result(serde_json::json!({ "checks": parts, "speed": speed, "drives": drives }));
     if failed > 0 { Err(Failure::Ads { findings: failed }) } else { Ok(()) }
 }
 
@@ -91,17 +99,17 @@ pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failu
 /// file of its map, so the file must lie on disk as long as the planner is checked.
 fn own_space(output: &Output) -> Result<(ActionTable, Scratch), Failure> {
     let scratch = Scratch::new("ads-check")?;
-    for (name, text) in SHIPPED {
+    for (name, text) in SHIPPED.into_iter().chain([SPACE]) {
         let file = scratch.path.join(name);
         make_way(&scratch.path, &file)?;
         write_new(&file, text)?;
     }
-    Ok((load::table(output, &scratch.path.join(SPACE))?, scratch))
+    Ok((load::table(output, &scratch.path.join(SPACE.0))?, scratch))
 }
 
-struct Checks<'a> {
+pub(super) struct Checks<'a> {
     output: &'a Output,
-    seed: u64,
+    pub seed: u64,
     parts: Vec<Part>,
     speed: Option<Speed>,
     /// Whether the driving system says that it is deterministic.
@@ -202,10 +210,36 @@ impl Checks<'_> {
                 let found = format!(
                     "after `close`, {how}: leave the loop at `close` or at the end of the input, and end with status 0"
                 );
-                self.note("close", false, found, None);
+                self.note("FAILS", Part { stage: "close", passed: false, found, failure: None });
             }
         }
         Ok(())
+    }
+
+    /// Drives the road that is asked for, or all, in a fresh process.
+    fn drives(
+        &mut self,
+        table: ActionTable,
+        road: &Option<String>,
+        settings: ExternalSettings,
+        times: u32,
+    ) -> Result<Vec<Drives>, Failure> {
+        let roads = match road {
+            Some(road) => vec![road.clone()],
+            None => table.space().roads.iter().map(|road| road.name.clone()).collect(),
+        };
+        let program = Program::new(settings);
+        if let Err(failure) = program.start() {
+            self.fail("alone", "it does not come up again", failure);
+            return Ok(Vec::new());
+        }
+        let arena = Arena::new(table, &roads, Selected::external(Arc::clone(&program)), &[], &[])?;
+        let drives = drive(self, &arena, program.settings(), times);
+        if let Some(text) = thinking_text(Some(&program)) {
+            self.output.say(&format!("      time     {text}"));
+        }
+        program.close().ok();
+        Ok(drives)
     }
 
     /// An episode with random actions, broken off after so many steps.
@@ -244,12 +278,13 @@ impl Checks<'_> {
             return true;
         }
         let advice = Problem::OtherAnswer.advice();
-        self.note(stage, false, format!("{what} gets other answers: {how}; {advice}"), None);
+        let found = format!("{what} gets other answers: {how}; {advice}");
+        self.note("FAILS", Part { stage, passed: false, found, failure: None });
         false
     }
 
     fn pass(&mut self, stage: &'static str, found: String) {
-        self.note(stage, true, found, None);
+        self.note("ok", Part { stage, passed: true, found, failure: None });
     }
 
     fn fail(&mut self, stage: &'static str, what: &str, failure: Finding) {
@@ -257,13 +292,13 @@ impl Checks<'_> {
         for line in failure.stderr_lines(STDERR_LINES) {
             found.push_str(&format!("\n  | {line}"));
         }
-        self.note(stage, false, found, Some(failure));
+        self.note("FAILS", Part { stage, passed: false, found, failure: Some(failure) });
     }
 
-    fn note(&mut self, stage: &'static str, passed: bool, found: String, failure: Option<Finding>) {
-        let word = if passed { "ok" } else { "FAILS" };
-        self.output.say(&format!("{word:<6}{stage:<9}{found}"));
-        self.parts.push(Part { stage, passed, found, failure });
+    /// Prints a result under a word: `ok`, `look` or `FAILS`.
+    pub(super) fn note(&mut self, word: &str, part: Part) {
+        self.output.say(&format!("{word:<6}{:<9}{}", part.stage, part.found));
+        self.parts.push(part);
     }
 }
 

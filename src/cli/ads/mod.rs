@@ -1,6 +1,7 @@
 //! `avastra ads`: for those who attach a driving system of their own.
 
 mod check;
+mod drive;
 mod toy;
 
 use avastra_drivers::external::schemas;

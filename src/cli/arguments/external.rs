@@ -32,6 +32,9 @@ pub struct AdsCheckArguments {
     /// Road to drive [default: the first of the space].
     #[arg(long)]
     pub road: Option<String>,
+    /// Drive each road of the space N times alone and N times in light traffic, too, under the law, and say what is unfit.
+    #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "2", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub drive: Option<u32>,
     /// Seed of the episodes.
     #[arg(long, default_value_t = 1, value_parser = super::seed)]
     pub seed: u64,
