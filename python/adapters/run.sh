@@ -4,7 +4,7 @@
 # NAME is a folder beside this file; what follows a colon is an option of the adapter. The rest are the arguments of `avastra run`; without
 # them only the profile is written, for other commands: `avastra replay FILES --ads target/adapters/sumo.yaml`.
 # The packages are installed once, under target/adapters/NAME. The driver gets the truth instead of what `modular`
-# perceives, so that its mistakes are its own; OBSERVATION=perceived changes that. PYTHON is a Python 3.11, AVASTRA the command.
+# perceives, so that its mistakes are its own; OBSERVATION=perceived changes that. PYTHON is the Python to install into, AVASTRA the command.
 set -eu
 
 here=$(cd "$(dirname "$0")" && pwd)
@@ -17,12 +17,26 @@ option=${option#:}
 [ -f "$here/$name/driver.py" ] || { echo "run.sh: there is no adapter \`$name\`; there are: $(cd "$here" && echo */ | tr -d /)" >&2; exit 1; }
 
 venv=$root/target/adapters/$name
-if [ ! -e "$venv/installed" ]; then
-    "${PYTHON:-python3.11}" -m venv "$venv"
+# Python 3.11 is what the adapters were written with and what every package of theirs has wheels for; others may do.
+find_python() {
+    for python in ${PYTHON:-python3.11 python3 python3.12 python3.10 python3.9}; do
+        if "$python" -c 'import sys; sys.exit(sys.version_info < (3, 9))' 2>/dev/null; then
+            echo "$python"
+            return
+        fi
+    done
+    echo "run.sh: there is no Python from 3.9 on: tried ${PYTHON:-python3.11, python3, python3.12, python3.10 and python3.9}; PYTHON names another" >&2
+    exit 1
+}
+if ! cmp -s "$here/$name/requirements.txt" "$venv/installed"; then
+    python=$(find_python)
+    "$python" -m venv "$venv"
     "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$here/$name/requirements.txt"
     packages=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
     echo "$root/python" >"$packages/avastra.pth"
-    touch "$venv/installed"
+    # What pip cannot install, an adapter fetches itself, into the folder that it is told.
+    [ ! -f "$here/$name/install.py" ] || "$venv/bin/python" "$here/$name/install.py" "$venv"
+    cp "$here/$name/requirements.txt" "$venv/installed"
 fi
 
 profile=$venv${option:+.$option}.yaml
