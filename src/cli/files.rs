@@ -9,7 +9,7 @@ use avastra_campaign::files;
 use avastra_drivers::external;
 
 use super::error::Failure;
-use super::load::{self, answers_path};
+use super::load::{self, answers_path, stderr_path};
 
 /// Refuses a file by its name before work begins, so that no scenario or database is overwritten by mistake. A pipe or a
 /// device may have any name.
@@ -164,7 +164,13 @@ pub fn copy_map(map: &Path, target: &Path) -> Result<(), Failure> {
 /// Writes the answers of an external driving system beside the scenario of its episode; nothing for others.
 pub fn write_answers(scenario: &Path, log: &EpisodeLog) -> Result<(), Failure> {
     match log.conversation.as_deref() {
-        Some(conversation) => write(&answers_path(scenario), &external::to_text(&conversation.exchanges)),
+        Some(conversation) => {
+            let said = conversation.stderr();
+            if !said.is_empty() {
+                write(&stderr_path(scenario), &said)?;
+            }
+            write(&answers_path(scenario), &external::to_text(&conversation.exchanges))
+        }
         None => Ok(()),
     }
 }

@@ -399,6 +399,11 @@ pub fn answers_path(scenario: &Path) -> PathBuf {
     scenario.with_extension("answers.jsonl")
 }
 
+/// The file of what the driving system of a scenario wrote to standard error.
+pub fn stderr_path(scenario: &Path) -> PathBuf {
+    scenario.with_extension("stderr.txt")
+}
+
 /// A scenario with the recorded answers of its driving system, if that is an external one and they lie beside it.
 fn with_answers(mut scenario: Scenario, path: &Path) -> Result<Scenario, Failure> {
     let answers = answers_path(path);

@@ -550,6 +550,10 @@ fn copy_scenario(name: &PlainName, text: &str, way: &Way) -> Result<String, Fail
     let answers = load::answers_path(&way.from.join(name));
     if answers.is_file() {
         copy_text(&load::answers_path(&way.to.join(name)), &own_text(&answers)?)?;
+        let said = load::stderr_path(&way.from.join(name));
+        if said.is_file() {
+            copy_text(&load::stderr_path(&way.to.join(name)), &own_text(&said)?)?;
+        }
     }
     Ok(text)
 }

@@ -16,6 +16,7 @@ use avastra_world::action::ActionTable;
 
 use super::arguments::ReplayArguments;
 use super::error::Failure;
+use super::files::write_named;
 use super::load;
 use super::look::{self, Changed, Looked};
 use super::output::{Output, for_shell, plural};
@@ -33,6 +34,9 @@ enum Replayed {
 /// tells what happens.
 pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failure> {
     let asked = load::asked(arguments.against.ads.as_deref())?;
+    if arguments.record.is_some() && arguments.many.files.len() != 1 {
+        return Err(Failure::usage("`--record` writes the questions of one scenario: name one file"));
+    }
     let played = each_file(output, &arguments.many, asked.external.as_ref(), |path| {
         let loaded = load::read_and_check(path)?;
         if load::is_policy(&loaded) {
@@ -42,8 +46,7 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
         let (ads, is_recorded) = asked.selected_for(&scenario)?;
         let in_file = |played: Played| Replayed::Scenario(Box::new(played));
         if is_recorded {
-            return play((&table, &scenario), path, (&ads, None), changed.as_ref(), arguments.repeat)
-                .map(in_file);
+            return play((&table, &scenario), path, (&ads, None), changed.as_ref(), arguments).map(in_file);
         }
         let profile = arguments.against.ads.as_deref().and_then(load::profile_path);
         let name = match (profile, ads.program()) {
@@ -51,7 +54,7 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
             (Some(path), None) => format!("{} with {}", ads.name(), path.shown()),
             (None, None) => ads.name().to_owned(),
         };
-        play((&table, &scenario), path, (&ads, Some(name)), changed.as_ref(), arguments.repeat).map(in_file)
+        play((&table, &scenario), path, (&ads, Some(name)), changed.as_ref(), arguments).map(in_file)
     })?;
     let (mut scenarios, mut policies, mut refuted) = (Vec::new(), Vec::new(), 0);
     for found in &played.done {
@@ -159,13 +162,13 @@ struct Played {
 }
 
 /// Plays a scenario. With a name for the driving system it is another one than the recorded: no claim is checked. `changed`
-/// are the changes since the file was written. Its findings are played up to `repeat` times more.
+/// are the changes since the file was written.
 fn play(
     (table, scenario): (&ActionTable, &Scenario),
     path: &Path,
     (ads, other): (&Selected, Option<String>),
     changed: Option<&Changed>,
-    repeat: u32,
+    ReplayArguments { repeat, record, .. }: &ReplayArguments,
 ) -> Result<Played, Failure> {
     let stage = Stage::new(table, scenario)?;
     let mut gauges = Gauges::default();
@@ -231,7 +234,7 @@ fn play(
             lines.chain(crashes).chain(failure).chain(end).collect::<Vec<_>>().join("\n")
         }
     };
-    let again = recurrences((table, scenario), &stage, (ads, &log), repeat);
+    let again = recurrences((table, scenario), &stage, (ads, &log), *repeat);
     let is_mixed = mixed_text(doubted.is_some());
     let again_text = again.iter().map(|again| format!("\n  {}{is_mixed}", again.in_words()));
     let told = told + &again_text.collect::<String>();
@@ -239,6 +242,15 @@ fn play(
     let crashes: Vec<_> = log.incidents.iter().map(|crash| {
         serde_json::json!({ "at_s": crash.time_s, "obstacle": crash.obstacle, "other": crash.other })
     }).collect();
+    if let Some(record) = record {
+        let Some(conversation) = &log.conversation else {
+            return Err(Failure::usage(format!(
+                "`--record`: `{}` is a driving system of avastra, which is told nothing by messages",
+                ads.name()
+            )));
+        };
+        write_named(record, &conversation.evidence(&scenario.name))?;
+    }
     let is_same = if other.is_none() { stage.is_as_recorded(&log) } else { None };
     let banner = changed.map(|changed| changed.banner(is_same));
     let breach = |found: &Breach| {

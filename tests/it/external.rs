@@ -373,6 +373,73 @@ fn a_review_keeps_recorded_answers_that_hold() {
 }
 
 #[test]
+fn a_finding_keeps_what_the_program_was_told_and_said() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let path = |name: &str| scratch.path().join(name).display().to_string();
+    let program = cargo_bin("avastra").display().to_string();
+    let script = format!("echo 'up \u{1b}[2J' >&2\nexec '{program}' ads toy --answer trajectory --blind\n");
+    std::fs::write(path("planner.sh"), script).expect("a script is written");
+    let command = format!("sh {}", path("planner.sh"));
+    let run =
+        ["run", SPACE, "--road", "corner", "--episodes", "2", "--seed", "1", "--jobs", "1", "--repeat", "0"];
+    done(&[&run[..], &["--ads", &command, "--out", &path("run")]].concat());
+    let files = texts(scratch.path().join("run/critical"));
+    let (name, text) = files.iter().find(|(name, _)| name.ends_with(".ava")).expect("it crashes");
+    // The one process wrote when it came up, and nothing in the second episode.
+    let said = files.get("corner_0000.stderr.txt").expect("it wrote something");
+    assert_eq!(said, "reset: up \u{fffd}[2J\n");
+    assert_eq!(files.keys().filter(|name| name.ends_with(".stderr.txt")).count(), 1);
+
+    let file = path(&format!("run/critical/{name}"));
+    let record = |more: &[&str]| {
+        outcome(&mut avastra(&[&["replay", &file, "--record", &path("told.jsonl")], more].concat()));
+        let told = std::fs::read_to_string(path("told.jsonl")).expect("it is written");
+        told.lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect::<Vec<Value>>()
+    };
+    let told = record(&[]);
+    assert_eq!(
+        (&told[0]["format"], &told[1]["question"]["type"]),
+        (&"avastra-evidence/1".into(), &"reset".into())
+    );
+    let answers = files.get(&name.replace(".ava", ".answers.jsonl")).expect("they lie beside it");
+    assert!(
+        told.len() > 100 && told.len() <= answers.lines().count(),
+        "the episode went on after the scenario"
+    );
+    for (number, line) in told[2..].iter().enumerate() {
+        let question = &line["question"];
+        assert_eq!((&question["type"], &question["seq"]), (&"step".into(), &number.into()));
+        assert_eq!(line["outcome"]["answer"]["seq"], question["seq"]);
+        let npcs = line["npcs"].as_object().map_or(0, serde_json::Map::len);
+        assert_eq!(
+            npcs,
+            question["objects"].as_array().expect("a list").len(),
+            "each object is known: {line}"
+        );
+        assert!(line["took_ms"].is_null(), "nobody was asked");
+    }
+    // The road user that is hit was told of.
+    let hit = text
+        .split("expect collision with npc#")
+        .nth(1)
+        .and_then(|rest| rest.split(' ').next())
+        .expect("a number");
+    assert!(told.last().expect("a line")["npcs"].to_string().contains(&format!(":{hit}")), "{text}");
+    let asked = record(&["--ads", &command]);
+    assert!(
+        asked[2]["took_ms"].as_f64() > Some(0.0) && asked[1]["stderr"] == "up \u{fffd}[2J\n",
+        "{}",
+        asked[1]
+    );
+    // A driving system of avastra is told nothing by messages.
+    let (status, _, said) =
+        outcome(&mut avastra(&["replay", &file, "--ads", "idm", "--record", &path("none")]));
+    assert!(
+        status == 1 && said.contains("is told nothing by messages") && !Path::new(&path("none")).exists()
+    );
+}
+
+#[test]
 fn a_check_passes_for_every_kind_of_answer_and_finds_what_remembers() {
     let program = cargo_bin("avastra").display().to_string();
     let check = |toy: &[&str]| {

@@ -128,7 +128,7 @@ fn origin(log: &EpisodeLog, source: &Provenance) -> Vec<Field> {
         }
         fields.push(tree::field("profile_digest", tree::text(profile.digest())));
     }
-    if let Some(Conversation { attached, exchanges }) = log.conversation.as_deref() {
+    if let Some(Conversation { attached, exchanges, .. }) = log.conversation.as_deref() {
         fields.push(tree::field("profile", tree::text(attached.to_line())));
         fields.push(tree::field("profile_digest", tree::text(attached.digest())));
         fields.push(tree::field("answers", tree::text(external::digest_of(exchanges))));

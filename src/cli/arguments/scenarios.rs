@@ -34,6 +34,10 @@ pub struct ReplayArguments {
     /// Play each scenario up to N times more under other noise, and say of each finding whether it recurs.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(REPLAYS_MAX)))]
     pub repeat: u32,
+    /// Write what a driving system of your own was told and answered in one scenario, step by step, as lines of JSON. The program
+    /// is not needed; with `--ads` it is asked, and its times and standard error are there, too.
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
     #[command(flatten)]
     pub many: FilesArguments,
 }

@@ -19,7 +19,7 @@ use super::follow::Follower;
 use super::message::{Answer, Event, Observation, Question};
 use super::program::{MapLine, Program};
 use super::question;
-use super::record::{Conversation, Key, Outcome};
+use super::record::{Conversation, Key, Outcome, Told, Transcript};
 use super::session::{Patience, Session};
 use super::settings::OnTimeout;
 
@@ -57,6 +57,18 @@ struct Exchange {
     /// Number and time, µs, of the step that it asks; `None` of a reset.
     step: Option<(u64, u64)>,
     outcome: Outcome,
+    aside: Aside,
+}
+
+/// What is known of a question beside its outcome.
+#[derive(Clone, Default)]
+struct Aside {
+    /// How long the answer took, s, if a process was asked.
+    took_s: Option<f64>,
+    /// What the process wrote to standard error meanwhile.
+    said: String,
+    /// The tracks that it was told of, with the road users that they are; `None` is a ghost.
+    tracks: Vec<(u32, Option<u32>)>,
 }
 
 /// The process that answers, with the number of exchanges that it took part in. A copy has none.
@@ -95,7 +107,8 @@ impl External {
     fn ask(&mut self, sensed: &Sensed, tick: u64, route_m: (f64, f64)) {
         if self.exchanges.is_empty() {
             let reset = question::reset(&self.scene, sensed, self.seed);
-            if let Some(outcome) = self.exchange(Question::Reset(reset).line().into(), self.map.key, None) {
+            let line = Question::Reset(reset).line().into();
+            if let Some(outcome) = self.exchange(line, self.map.key, None, Vec::new()) {
                 debug_assert_eq!(outcome, Outcome::Ready);
             }
             if self.failure.is_some() {
@@ -111,7 +124,13 @@ impl External {
         self.touched = sensed.ego.touched;
         lines.push_str(&Question::Step(Box::new(step)).line());
         let before = self.exchanges[self.exchanges.len() - 1].key;
-        if let Some(Outcome::Answer(answer)) = self.exchange(lines.into(), before, Some((seq, t_us))) {
+        let perceived = self.observer.as_ref().map(|observer| &observer.status().perceived);
+        let tracks = match perceived {
+            Some(perceived) => perceived.iter().map(|object| (object.track, object.id)).collect(),
+            None => sensed.objects.iter().map(|object| (object.id, Some(object.id))).collect(),
+        };
+        if let Some(Outcome::Answer(answer)) = self.exchange(lines.into(), before, Some((seq, t_us)), tracks)
+        {
             let (_, latency) = self.program.settings().ticks();
             self.coming.push_back((tick + latency, answer));
             self.answered_tick = tick;
@@ -119,11 +138,19 @@ impl External {
     }
 
     /// One question, answered from what is known or by a process. `None` after a failure.
-    fn exchange(&mut self, question: Arc<str>, before: Key, step: Option<(u64, u64)>) -> Option<Outcome> {
+    fn exchange(
+        &mut self,
+        question: Arc<str>,
+        before: Key,
+        step: Option<(u64, u64)>,
+        tracks: Vec<(u32, Option<u32>)>,
+    ) -> Option<Outcome> {
         let key = before.then(&question);
+        let mut aside = Aside::default();
         let outcome = self.program.known(key).unwrap_or_else(|| {
-            let outcome =
-                self.asked(&question, step).unwrap_or_else(|failure| Outcome::Failed(failure.into()));
+            let outcome = self
+                .asked(&question, step, &mut aside)
+                .unwrap_or_else(|failure| Outcome::Failed(failure.into()));
             if matches!(&outcome, Outcome::Answer(answer) if answer.is_extreme()) {
                 self.program.cut_off();
             }
@@ -137,18 +164,24 @@ impl External {
             self.failure = Some(Arc::clone(failure));
             self.live = Live::default();
         }
-        self.exchanges.push(Exchange { key, question, step, outcome: outcome.clone() });
+        let aside = Aside { tracks, ..aside };
+        self.exchanges.push(Exchange { key, question, step, outcome: outcome.clone(), aside });
         self.failure.is_none().then_some(outcome)
     }
 
     /// Asks a process, which first is shown all that it has missed of the episode.
-    fn asked(&mut self, question: &str, step: Option<(u64, u64)>) -> Result<Outcome, Failure> {
+    fn asked(
+        &mut self,
+        question: &str,
+        step: Option<(u64, u64)>,
+        aside: &mut Aside,
+    ) -> Result<Outcome, Failure> {
         let up_to_date = self.live.0.take().filter(|(_, seen)| *seen == self.exchanges.len());
         let mut session = match up_to_date {
             Some((session, _)) => session,
             None => self.caught_up()?,
         };
-        let outcome = self.answer(&mut session, question, step)?;
+        let outcome = self.answer(&mut session, question, step, aside)?;
         self.live = Live(Some((session, self.exchanges.len() + 1)));
         Ok(outcome)
     }
@@ -173,7 +206,8 @@ impl External {
                 session.pass(&exchange.question);
                 continue;
             }
-            let again = self.answer(&mut session, &exchange.question, exchange.step)?;
+            let mut aside = Aside::default();
+            let again = self.answer(&mut session, &exchange.question, exchange.step, &mut aside)?;
             // A program that says it may answer otherwise is not at fault when it does.
             if self.program.is_deterministic() && !again.means(&exchange.outcome) {
                 let stage = exchange.step.map_or("reset".to_owned(), |(seq, _)| format!("step {seq}"));
@@ -194,20 +228,22 @@ impl External {
         session: &mut Session,
         question: &str,
         step: Option<(u64, u64)>,
+        aside: &mut Aside,
     ) -> Result<Outcome, Failure> {
         let settings = self.program.settings();
         let Some((seq, t_us)) = step else {
             session.ready(question, "reset", settings.timeouts.reset_s)?;
+            aside.said = session.said();
             return Ok(Outcome::Ready);
         };
         let waits_for_late = settings.on_timeout == OnTimeout::Strict;
-        match session.step(
-            question,
-            (seq, t_us),
-            Patience { limit_s: settings.timeouts.step_s, waits_for_late },
-        )? {
+        let patience = Patience { limit_s: settings.timeouts.step_s, waits_for_late };
+        let answered = session.step(question, (seq, t_us), patience)?;
+        aside.said = session.said();
+        match answered {
             Some((answer, took_s)) => {
                 self.program.thought(took_s);
+                aside.took_s = Some(took_s);
                 Ok(Outcome::answered(answer))
             }
             None => {
@@ -306,7 +342,12 @@ impl Ads for External {
 
     fn conversation(&self) -> Option<Conversation> {
         let exchanges = self.exchanges.iter().map(|exchange| (exchange.key, exchange.outcome.clone()));
-        Some(Conversation { attached: self.program.attached(), exchanges: exchanges.collect() })
+        let told = self.exchanges.iter().map(|exchange| {
+            let Exchange { question, step, aside: Aside { took_s, said, tracks }, .. } = exchange.clone();
+            Told { question, t_us: step.map(|(_, t_us)| t_us), took_s, said, tracks }
+        });
+        let transcript = Transcript(told.collect());
+        Some(Conversation { attached: self.program.attached(), exchanges: exchanges.collect(), transcript })
     }
 }
 

@@ -111,6 +111,8 @@ pub struct Link {
     /// The process has ended, though its output is open.
     is_orphaned: bool,
     stderr: Vec<u8>,
+    /// Standard error that nobody took yet.
+    said: Vec<u8>,
     /// Bytes of standard error since the episode began.
     flood_bytes: u64,
     /// The process was reaped and its group ended: its number may belong to another.
@@ -162,6 +164,7 @@ impl Link {
             is_closed: false,
             is_orphaned: false,
             stderr: Vec::new(),
+            said: Vec::new(),
             flood_bytes: 0,
             is_ended: false,
         })
@@ -272,6 +275,8 @@ impl Link {
                     Ok(count) => {
                         self.flood_bytes += count as u64;
                         self.stderr.extend_from_slice(&chunk[..count]);
+                        let room = STDERR_BYTES_KEPT.saturating_sub(self.said.len());
+                        self.said.extend_from_slice(&chunk[..count.min(room)]);
                         if self.stderr.len() > 2 * STDERR_BYTES_KEPT {
                             self.stderr.drain(..self.stderr.len() - STDERR_BYTES_KEPT);
                         }
@@ -352,6 +357,14 @@ impl Link {
             self.read_all();
             std::thread::sleep(left.min(Duration::from_millis(2)));
         }
+    }
+
+    /// Standard error since this was asked last, at most the first 64 KiB of it, as text.
+    pub fn said(&mut self) -> String {
+        if self.said.is_empty() {
+            return String::new();
+        }
+        harmless(&String::from_utf8_lossy(&core::mem::take(&mut self.said)))
     }
 
     /// The end of standard error as text.

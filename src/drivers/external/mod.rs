@@ -24,7 +24,9 @@ pub use finding::{Failure, FailureKind, Problem};
 pub use link::end_all;
 pub use message::{AnswerKind, Observation, PROTOCOL, schemas};
 pub use program::Program;
-pub use record::{Attached, Conversation, Key, Outcome, RecordError, digest_of, from_text, to_text};
+pub use record::{
+    Attached, Conversation, Key, Outcome, RecordError, Told, Transcript, digest_of, from_text, to_text,
+};
 pub use sequences::odd_orders;
 pub use session::Identity;
 pub use settings::{ExternalError, ExternalSettings, OnTimeout, Target, Timeouts};

@@ -3,6 +3,7 @@
 //! A question is known by a digest of the conversation up to it, so an answer is found again only where everything
 //! before was the same. The questions are not kept: they follow from the episode.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -183,9 +184,92 @@ impl Attached {
 pub struct Conversation {
     pub attached: Attached,
     pub exchanges: Vec<(Key, Outcome)>,
+    /// The same questions in full.
+    pub transcript: Transcript,
+}
+
+/// The questions of a conversation, and what is known beside their answers. What a clock or a process said is no part of an
+/// episode, so any two are equal.
+#[derive(Debug, Clone, Default)]
+pub struct Transcript(pub Vec<Told>);
+
+impl PartialEq for Transcript {
+    fn eq(&self, _: &Transcript) -> bool {
+        true
+    }
+}
+
+/// One question of a conversation.
+#[derive(Debug, Clone)]
+pub struct Told {
+    /// Its lines: of a step perhaps after an event.
+    pub question: Arc<str>,
+    /// Time of the step, µs; `None` of a reset.
+    pub t_us: Option<u64>,
+    /// How long the answer took, s; `None` if no process was asked, because the answer was known.
+    pub took_s: Option<f64>,
+    /// What the process wrote to standard error meanwhile.
+    pub said: String,
+    /// The tracks that it was told of, with the numbers of the road users that they are; `None` is a ghost.
+    pub tracks: Vec<(u32, Option<u32>)>,
+}
+
+/// One line of [`evidence`].
+#[derive(Serialize)]
+struct Evidence<'a> {
+    /// Time of the episode, s; absent of a reset.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    t_s: Option<f64>,
+    question: &'a serde_json::value::RawValue,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    event: Option<&'a serde_json::value::RawValue>,
+    outcome: &'a Outcome,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    took_ms: Option<f64>,
+    #[serde(skip_serializing_if = "str::is_empty")]
+    stderr: &'a str,
+    /// By the ids of objects in the question; null is a ghost.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    npcs: BTreeMap<u32, Option<u32>>,
 }
 
 impl Conversation {
+    /// All that was asked and answered, a line of JSON each after a head: for a reader, or for a planner's own tests.
+    pub fn evidence(&self, scenario: &str) -> String {
+        let head = serde_json::json!({
+            "format": "avastra-evidence/1", "scenario": scenario, "ads": self.attached.title(),
+        });
+        let mut text = line(&head);
+        for ((_, outcome), told) in self.exchanges.iter().zip(&self.transcript.0) {
+            let mut lines = told.question.lines().rev();
+            let mut raw = || serde_json::from_str::<&serde_json::value::RawValue>(lines.next()?).ok();
+            let Some(question) = raw() else { continue };
+            text.push_str(&line(&Evidence {
+                t_s: told.t_us.map(|t_us| t_us as f64 / 1e6),
+                question,
+                event: raw(),
+                outcome,
+                took_ms: told.took_s.map(|took_s| (took_s * 1e6).round() / 1e3),
+                stderr: &told.said,
+                npcs: told.tracks.iter().copied().collect(),
+            }));
+        }
+        text
+    }
+
+    /// What the program wrote to standard error in the episode, each line after the time of the step. Empty if it wrote nothing,
+    /// or was not asked.
+    pub fn stderr(&self) -> String {
+        let mut text = String::new();
+        for told in self.transcript.0.iter().filter(|told| !told.said.is_empty()) {
+            let time = told.t_us.map_or("reset".to_owned(), |t_us| format!("{:.2} s", t_us as f64 / 1e6));
+            for line in told.said.lines() {
+                text.push_str(&format!("{time}: {line}\n"));
+            }
+        }
+        text
+    }
+
     /// The first step at which the same episode got another answer, and both answers in words.
     pub fn difference(&self, again: &Conversation) -> Option<(usize, String)> {
         let mut pairs = self.exchanges.iter().zip(&again.exchanges);
@@ -305,6 +389,7 @@ mod tests {
         assert_eq!(digest_of(&from_text(&text.replace("follow 3", "follow 4"), None).unwrap()), digest);
         assert_eq!(from_text("", None), Err(RecordError::Format));
         let part = |exchanges: &[(Key, Outcome)]| Conversation {
+            transcript: Transcript::default(),
             attached: Attached {
                 identity: None,
                 settings: ExternalSettings::of(Target::from_text("./planner").unwrap()),

@@ -190,6 +190,11 @@ impl Session {
         failed(&mut self.link, Broken { problem: Problem::OtherAnswer, detail }, stage)
     }
 
+    /// What the program wrote to standard error since this was asked last.
+    pub fn said(&mut self) -> String {
+        self.link.said()
+    }
+
     /// Says `close` and waits.
     ///
     /// # Errors
