@@ -106,6 +106,7 @@ fn load() -> Arc<Space> {
 fn crowded(scene: &Arc<Scene>) -> World {
     let start = Start {
         reactions: 0,
+        reactions_from_s: 0.0,
         ego_mps: avastra::model::START_MPS,
         time: TimeOfDay::Noon,
         sky: [Level::None; 3],

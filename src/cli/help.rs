@@ -93,6 +93,7 @@ replay runs/0001/critical/*.ava # check every claim
 replay policies/corner.ava # play the evaluation of a policy again
 replay runs/0001/critical/corner_0004.ava --ads idm # the same scene, another driver
 diagnose runs/0001/critical/corner_0004.ava # which module is at fault
+diagnose --moment runs/0001/critical/corner_0004.ava # from when on it was certain
 diagnose --mechanisms runs/0001/critical/*.ava # which weakness, over all files
 shrink runs/0001/critical/*.ava # write the smallest that still crash
 test runs/0001 # do its scenarios still crash?

@@ -237,7 +237,7 @@ diagnose
   cures[] object? `cure` (the smallest change that removes a finding) and `count`
   mechanisms[] object? with `--mechanisms`: a weakness and what vanishes without it
   placebo object? with `--mechanisms`: what vanishes by other sensor noise alone
-  scenarios[] object `file`, `scenario`; its `diagnosis`, or with `--mechanisms` `without` and `placebo`
+  scenarios[] object `file`, `scenario`; its `diagnosis`, or with `--mechanisms` `without` and `placebo`; with `--moment` when it happened (`found_s`), the `moments` looked at with the branches in which it happened again (`recurred` of `replays`), when more than three quarters did (`rises_s`), and `avoidable_until_s`
   FAILED
 shrink
   median_steps_before number

@@ -77,6 +77,7 @@ pub fn start(seed: u64) -> Start {
     let traffic = TrafficProfile::default();
     Start {
         reactions: 0,
+        reactions_from_s: 0.0,
         ego_mps: avastra::model::START_MPS,
         time,
         sky: [3, 12, 5].map(pick),

@@ -32,6 +32,7 @@ mod learners;
 mod links;
 mod manoeuvres;
 mod maps;
+mod moments;
 mod motorway;
 mod pedestrians;
 mod policies;

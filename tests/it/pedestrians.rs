@@ -60,6 +60,7 @@ fn a_step_out_from_behind_is_an_action_that_replays() {
 fn walks(scene: &Arc<Scene>, side: Side, covers: &[Option<Body>]) -> usize {
     let start = Start {
         reactions: 0,
+        reactions_from_s: 0.0,
         ego_mps: avastra::model::START_MPS,
         time: TimeOfDay::Noon,
         sky: [Level::None; 3],

@@ -134,6 +134,20 @@ pub fn judge_with_drives(
     })
 }
 
+/// The last moment, s, at which a careful driver could have taken over and avoided the nth collision of a log; `None` if at no
+/// moment of the last 8 s one could.
+pub(super) fn avoidable_until(setup: &Setup, script: &Script, log: &EpisodeLog, index: usize) -> Option<f64> {
+    let until_s = before_each(setup, script, log, |recording, contact, _| {
+        if *contact != log.collisions[index].contact {
+            return None;
+        }
+        let mut moments = (0..recording.len()).rev().step_by(FRAME_TICKS as usize);
+        let last = moments.find(|from| !Case::new(recording, *from, contact).avoided_by(&CAREFUL).is_empty());
+        last.map(|from| recording[from].time_s())
+    });
+    until_s.into_iter().flatten().next()
+}
+
 /// The drive of a reference driver from its takeover until it is clear, touches something, or leaves the way that it has
 /// to keep.
 #[derive(Debug, Clone, PartialEq)]

@@ -11,6 +11,7 @@ mod kept;
 mod lawful;
 mod measured;
 mod mechanisms;
+mod moment;
 mod recurrence;
 mod severity;
 mod shrink;
@@ -33,6 +34,7 @@ pub use measured::Measure;
 pub use mechanisms::{
     MechanismShare, Mechanisms, Share, WithoutMechanism, mechanism_shares, mechanisms, placebo,
 };
+pub use moment::{BRANCHES, Branched, NoReturn, no_return};
 pub use recurrence::{MIXED, REPLAYS, Recurrence, Replayed, can_replay, mixed_text};
 pub use severity::{Harm, Severity, severity};
 pub use shrink::{Shrunk, Worth, shrink, spare_steps};

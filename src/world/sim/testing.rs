@@ -58,6 +58,7 @@ pub fn start() -> Start {
         signal_phase_s: 0.0,
         seed: 7,
         reactions: 0,
+        reactions_from_s: 0.0,
         ambient: 0,
         traffic: TrafficProfile::default(),
     }

@@ -49,6 +49,8 @@ pub struct Start {
     /// The moment of a frame (0.1 s) in which each of them looks at the world. With 0 it follows from their numbers,
     /// otherwise it is drawn from this seed. So others react by up to a frame sooner or later.
     pub reactions: u64,
+    /// Until this moment of the episode, s, they look as with `reactions` 0.
+    pub reactions_from_s: f64,
     /// Vehicles of ambient traffic that are kept around the ego vehicle, at most `model::AMBIENT_MAX`.
     pub ambient: u32,
     /// How other vehicles drive.
@@ -69,6 +71,7 @@ impl Start {
             signal_phase_s: road.signal_phase_s.unwrap_or(signal_phase_s),
             seed,
             reactions: 0,
+            reactions_from_s: 0.0,
             ambient: 0,
             traffic: TrafficProfile::default(),
         }
@@ -118,6 +121,8 @@ pub struct World {
     /// Seed of the choices of other road users, and that of when they look.
     pub(crate) seed: u64,
     pub(crate) reactions: u64,
+    /// Tick from which `reactions` hold.
+    pub(crate) reactions_from: u64,
     // The contacts and incidents of the last tick. No later tick reads them.
     pub(crate) contacts: Vec<Contact>,
     pub(crate) incidents: Vec<Incident>,
@@ -321,7 +326,7 @@ traced! {
         reactions
     } but {
         // No tick changes these.
-        scene, traffic,
+        scene, traffic, reactions_from,
         // It follows from the station, and what is shown from the clock.
         ego_elevation_m, colours,
         // It follows from the contacts, and they from what is traced.

@@ -90,6 +90,7 @@ impl World {
             weather_tick: 0,
             seed: start.seed,
             reactions: start.reactions,
+            reactions_from: (start.reactions_from_s / DT_S).round() as u64,
             contacts: Vec::new(),
             incidents: Vec::new(),
             scene,

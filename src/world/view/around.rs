@@ -63,6 +63,8 @@ pub struct Around<'a> {
     pub seed: u64,
     /// As `Start::reactions`.
     pub reactions: u64,
+    /// Tick from which they hold.
+    pub reactions_from: u64,
 }
 
 /// The facts that a driver needs about another road user, or the ego vehicle, so as not to run into it.
@@ -100,6 +102,7 @@ impl Around<'_> {
     pub fn is_due(&self, id: u32, every_ticks: u64) -> bool {
         let own = match self.reactions {
             0 => u64::from(id),
+            _ if self.tick < self.reactions_from => u64::from(id),
             // Fibonacci hashing (Knuth, TAOCP 6.4): neighbouring numbers are spread over the upper bits.
             seed => (seed ^ u64::from(id)).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32,
         };
@@ -234,6 +237,7 @@ impl World {
             traffic: &self.traffic,
             seed: self.seed,
             reactions: self.reactions,
+            reactions_from: self.reactions_from,
         }
     }
 }
