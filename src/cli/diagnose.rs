@@ -103,8 +103,10 @@ impl Case<'_> {
         let (log, _, found) = stage.first_found(&ads);
         let Some(found) = found else {
             let count = plural(log.collisions.len(), "collision");
+            let loose = ads.program().filter(|program| !program.is_deterministic());
+            let hint = loose.map_or("", |_| "; it is not deterministic, so another play may have it");
             return Err(Failure::usage(format!(
-                "`{}` {} with this driving system ({count} in all)",
+                "`{}` {} with this driving system ({count} in all){hint}",
                 scenario.name,
                 stage.lack_in_words()
             )));

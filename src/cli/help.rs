@@ -147,6 +147,9 @@ const MOVED: &[(&str, &str)] = &[
     ("--ads-config", "--ads FILE"),
     ("--ads-cmd", "--ads 'COMMAND'"),
     ("--compare", "--ads DRIVER"),
+    ("--replays", "--repeat N"),
+    ("--fail-on-collision", "--fail-on collision"),
+    ("--fail-on-breach", "--fail-on breach"),
 ];
 
 /// What is typed now in place of a command or an option that was.

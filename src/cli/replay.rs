@@ -9,6 +9,7 @@ use avastra_campaign::oracle;
 use avastra_campaign::oracle::{Found, Recurrence, Replayed as PlayedAgain, mixed_text};
 use avastra_campaign::run::{Asked, Gauges, Stage};
 use avastra_drivers::Selected;
+use avastra_drivers::external::EVIDENCE;
 use avastra_lang::check::Loaded;
 use avastra_lang::model::vocabulary::Word;
 use avastra_lang::model::{Avoidability, Policy, RequirementDef, Scenario, Space};
@@ -16,7 +17,7 @@ use avastra_world::action::ActionTable;
 
 use super::arguments::ReplayArguments;
 use super::error::Failure;
-use super::files::write_named;
+use super::files::{must_end_in, write_named};
 use super::load;
 use super::look::{self, Changed, Looked};
 use super::output::{Output, for_shell, plural};
@@ -34,13 +35,16 @@ enum Replayed {
 /// tells what happens.
 pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failure> {
     let asked = load::asked(arguments.against.ads.as_deref())?;
-    if arguments.record.is_some() && arguments.many.files.len() != 1 {
-        return Err(Failure::usage("`--record` writes the questions of one scenario: name one file"));
+    if let Some(record) = &arguments.record {
+        can_record(record)?;
+        if arguments.many.files.len() != 1 {
+            return Err(Failure::usage("`--record` writes the questions of one scenario: name one file"));
+        }
     }
     let played = each_file(output, &arguments.many, asked.external.as_ref(), |path| {
         let loaded = load::read_and_check(path)?;
         if load::is_policy(&loaded) {
-            return replay_policy(output, path, loaded, &asked);
+            return replay_policy(output, path, loaded, (&asked, arguments));
         }
         let Looked { table, scenario, changed } = look::scenario_in(output, path, loaded)?;
         let (ads, is_recorded) = asked.selected_for(&scenario)?;
@@ -80,9 +84,37 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
     if findings > 0 { Err(Failure::Ads { findings }) } else { Ok(()) }
 }
 
+/// Refuses a file that evidence must not replace: only a new one, or older evidence.
+fn can_record(path: &Path) -> Result<(), Failure> {
+    must_end_in(path, "jsonl")?;
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if folder.is_some_and(|folder| !folder.is_dir()) {
+        return Err(Failure::file("write", path, "its folder does not exist"));
+    }
+    let is_evidence = |text: &str| text.lines().next().is_some_and(|head| head.contains(EVIDENCE));
+    match load::read(path) {
+        Ok(there) if !there.is_empty() && !is_evidence(&there) => Err(Failure::usage(format!(
+            "`{}` is there and holds something else: choose another name for what is written",
+            path.shown()
+        ))),
+        _ => Ok(()),
+    }
+}
+
 /// Plays the evaluation of a policy again, against the driving system that it was trained against.
-fn replay_policy(output: &Output, path: &Path, loaded: Loaded, asked: &Asked) -> Result<Replayed, Failure> {
+fn replay_policy(
+    output: &Output,
+    path: &Path,
+    loaded: Loaded,
+    (asked, arguments): (&Asked, &ReplayArguments),
+) -> Result<Replayed, Failure> {
     let (table, policy) = load::policy_in(output, path, loaded)?;
+    if arguments.record.is_some() || arguments.repeat > 0 {
+        let path = path.shown();
+        return Err(Failure::usage(format!(
+            "`{path}` is a policy: `--record` and `--repeat` are for scenarios"
+        )));
+    }
     if !asked.is_nothing() {
         let (path, word) = (path.shown(), for_shell(path));
         return Err(Failure::usage(format!(
@@ -234,6 +266,12 @@ fn play(
             lines.chain(crashes).chain(failure).chain(end).collect::<Vec<_>>().join("\n")
         }
     };
+    if *repeat > 0 && !oracle::can_replay(ads) {
+        return Err(Failure::usage(format!(
+            "`--repeat`: `{}` was made against an external driving system, which must drive each replay: give it with `--ads`",
+            scenario.name
+        )));
+    }
     let again = recurrences((table, scenario), &stage, (ads, &log), *repeat);
     let is_mixed = mixed_text(doubted.is_some());
     let again_text = again.iter().map(|again| format!("\n  {}{is_mixed}", again.in_words()));
@@ -289,7 +327,7 @@ impl Again {
     fn in_words(&self) -> String {
         let what = match (&self.requirement, self.obstacle) {
             (Some(requirement), _) => format!("`{requirement}`"),
-            (None, obstacle) => format!("the collision with #{}", obstacle.unwrap_or_default()),
+            (None, obstacle) => format!("the collision with npc#{}", obstacle.unwrap_or_default()),
         };
         format!("{what} {}", self.recurrence.in_words())
     }

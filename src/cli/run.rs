@@ -108,8 +108,8 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
 /// Refuses to fail on what a run cannot find.
 fn can_fail_on(fail_on: &[FailOn], space: &Space, replays: u32) -> Result<(), Failure> {
     let why = match () {
-        () if fail_on.contains(&FailOn::Recurring) && replays == 0 => {
-            "`--fail-on recurring` needs replays, and the run has `--repeat 0`: begin one with `--repeat 20`"
+        () if fail_on.contains(&FailOn::Recurring) && !oracle::can_tell(replays) => {
+            "`--fail-on recurring` needs at least 7 replays, because fewer are never certain: begin a run with `--repeat 20`"
         }
         () if fail_on.contains(&FailOn::Breach) && space.requirements.is_empty() => {
             "`--fail-on breach` needs a requirement, and the space has none: add `use \"law.ava\"`, or a `require`"
@@ -208,6 +208,9 @@ fn play_all(
     let refusals = directory.read(Database::refusals)?;
     let is_mixed = program.is_some_and(|program| !program.is_deterministic());
     output.say(&totals_text(&totals, started.elapsed().as_secs_f64(), todo.len(), is_mixed));
+    if totals.replayed > 0 && !oracle::can_tell(run.settings().replays) {
+        output.say("fewer than 7 replays never show that a finding recurs: `--repeat 20`");
+    }
     if !refusals.is_empty() {
         output.say(&refusals_text(&refusals));
     }

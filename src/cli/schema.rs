@@ -267,6 +267,7 @@ test
   scenarios[].recorded bool from recorded answers: no program was asked
   scenarios[].found_with text? the driving system that found it, if it is another than the one under test
   scenarios[].again object? plays under other noise (`replays`), and those that failed (`recurred`)
+  scenarios[].ads_failed number further such plays in which the driving system itself failed
 report
   page text its path
   scenarios number on the page

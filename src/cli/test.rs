@@ -1,5 +1,6 @@
 //! `avastra test`: emitted scenarios as a regression suite for a driving system.
 
+use std::cell::Cell;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,7 +13,7 @@ use avastra_campaign::run::{self, Asked, RunError, Stage};
 use avastra_drivers::external::{Failure as AdsFailure, FailureKind};
 use avastra_drivers::{EXTERNAL, Selected};
 use avastra_lang::check::{Loaded, normal};
-use avastra_lang::model::{Claim, Scenario};
+use avastra_lang::model::{Claim, REPLAYS_MAX, Scenario};
 use avastra_lang::syntax::ast::FileId;
 use avastra_lang::syntax::{Diagnostic, Sources};
 use avastra_world::action::ActionTable;
@@ -37,8 +38,9 @@ struct Case {
     road: String,
     outcome: Outcome,
     by: By,
-    /// How often it failed in plays under other noise, if there were any.
+    /// How often it failed in plays under other noise, if there were any, and in how many more the driving system itself failed.
     again: Option<Recurrence>,
+    ads_failed: u32,
     /// The rate of failures below which it is fixed.
     below: f64,
     elapsed_s: f64,
@@ -182,7 +184,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
             serde_json::json!({ "file": case.file, "scenario": case.scenario,
                                 "outcome": outcome, "reason": reason, "recorded": case.by.is_recorded,
                                 "found_with": case.by.found_with,
-                                "again": case.again })
+                                "again": case.again, "ads_failed": case.ads_failed })
         })
         .collect();
     output.result(
@@ -231,12 +233,21 @@ fn needed_text(cases: &[Case]) -> Option<String> {
     let needed = |case: &Case| case.again.unwrap_or_default().clean_until_below(case.below);
     let (most, below) = passed.filter_map(|case| Some((needed(case)?, case.below))).max_by_key(|of| of.0)?;
     let played = cases.iter().filter_map(|case| case.again).map(|again| again.replays).max().unwrap_or(0);
+    let how = match most + played {
+        all if all <= REPLAYS_MAX => format!("(`--repeat {all}`)"),
+        _ => format!("(more than the {REPLAYS_MAX} of `--repeat`: ask for a higher rate with `--below`)"),
+    };
+    let replays = plural(most as usize, "clean replay");
     Some(format!(
-        "a pass is no proof: {most} clean replays more under other noise would show that less than {:.0} % fail\n\
-         (`--repeat {}`)",
-        100.0 * below,
-        most + played
+        "a pass is no proof: {replays} more under other noise would show that less than {} fail\n{how}",
+        percent(below)
     ))
+}
+
+/// A rate in per cent, with as many digits as it needs.
+fn percent(rate: f64) -> String {
+    let percent = format!("{:.1}", 100.0 * rate);
+    format!("{} %", percent.trim_end_matches(".0"))
 }
 
 /// Prints what came of a file.
@@ -311,7 +322,7 @@ impl Suite<'_> {
         let started = now();
         let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let mut notes = Notes::default();
-        let (scenario, road, outcome, by, again) = match self.open(file, &mut notes) {
+        let (scenario, road, outcome, by, (again, ads_failed)) = match self.open(file, &mut notes) {
             Ok((Emitted::Policy(..), _)) => return None,
             Ok((Emitted::Scenario(table, scenario), reviewed)) => {
                 let road = table.space().roads[scenario.road].name.clone();
@@ -321,20 +332,22 @@ impl Suite<'_> {
                 let by = self.by(&scenario);
                 let outcome = reviewed.unwrap_or_else(compared);
                 let again = match self.most_again(&by, &outcome) {
-                    0 => None,
-                    most => self.again(&table, &scenario, most),
+                    0 => (None, 0),
+                    most => self
+                        .again(&table, &scenario, most)
+                        .map_or((None, 0), |(again, failed)| (Some(again), failed)),
                 };
                 (scenario.name, road, outcome, by, again)
             }
             Err(failure) => {
                 let in_source = matches!(failure, Failure::Source { .. } | Failure::Outdated);
                 let outcome = Outcome::NotPlayed { reason: failure.to_string(), in_source };
-                (name, String::new(), outcome, By::default(), None)
+                (name, String::new(), outcome, By::default(), (None, 0))
             }
         };
         let (file, below) = (file.to_owned(), self.arguments.below);
         let elapsed_s = started.elapsed().as_secs_f64();
-        Some((Case { file, scenario, road, outcome, by, again, below, elapsed_s }, notes))
+        Some((Case { file, scenario, road, outcome, by, again, ads_failed, below, elapsed_s }, notes))
     }
 
     /// By what a scenario is played.
@@ -372,8 +385,9 @@ impl Suite<'_> {
     }
 
     /// Plays a scenario under other noise until it is certain whether it fails less often than asked. Any of its findings is a
-    /// failure, and so is one of the driving system itself. `None` if the driving system cannot be asked.
-    fn again(&self, table: &ActionTable, scenario: &Scenario, most: u32) -> Option<Recurrence> {
+    /// failure. A play in which the driving system itself failed says nothing of them, and is counted apart. `None` if the driving
+    /// system cannot be asked.
+    fn again(&self, table: &ActionTable, scenario: &Scenario, most: u32) -> Option<(Recurrence, u32)> {
         let recorded = run::recorded(scenario).ok()?;
         let (ads, _) = self.asked.selected_for(scenario).ok()?;
         let stage = Stage::new(table, scenario).ok()?;
@@ -393,16 +407,22 @@ impl Suite<'_> {
         let setup = stage.setup(&ads);
         let replayed = Replayed::new(&setup, &Script::of_scenario(scenario), &log);
         let below = self.arguments.below;
-        let fails = |play: &EpisodeLog| match findings.is_empty() {
-            _ if play.failure.is_some() => Some(true),
+        let ads_failed = Cell::new(0);
+        let claimed = claimed_failure(scenario);
+        let fails = |play: &EpisodeLog| match play.failure.as_ref().map(AdsFailure::kind) {
+            Some(kind) if Some(kind) == claimed => Some(true),
+            Some(_) => {
+                ads_failed.set(ads_failed.get() + 1);
+                None
+            }
             // A scenario of a failure of the driving system, which has not failed.
-            true => Some(false),
-            false => replayed.is_again(&findings, play),
+            None if findings.is_empty() => Some(false),
+            None => replayed.is_again(&findings, play),
         };
         let is_certain = |so_far: Recurrence| so_far.is_below(below) || so_far.is_above(below);
         let found = replayed.failing(fails, is_certain, most);
         // A driving system that was given up meanwhile drove only some of them.
-        oracle::can_replay(&ads).then_some(found)
+        oracle::can_replay(&ads).then_some((found, ads_failed.get()))
     }
 
     /// Reads a file. One whose space has changed is noted, or reviewed; then it may be known already what comes of it.
@@ -596,20 +616,25 @@ impl Case {
             // No program was asked, so only avastra can have changed.
             true if *is_recorded => "changed",
             true if self.again.is_some_and(|again| again.recurred > 0) => "still fails",
+            true if self.ads_failed > 0 => "ads failed",
             // That another driving system passes mends nothing.
             true if found_with.is_some() || !is_below => PASSED,
             _ => word,
         };
         let found_with = found_with.as_ref().filter(|_| word == PASSED);
         let again = self.again.map(|again| {
-            let percent = 100.0 * self.below;
-            let less = if is_below { format!(", so in less than {percent:.0} %") } else { String::new() };
+            let percent = percent(self.below);
+            let less = if is_below { format!(", so in less than {percent}") } else { String::new() };
             format!("fails in {again} under other noise{less}{}", mixed_text(*is_mixed))
+        });
+        let ads_failed = (self.ads_failed > 0).then(|| {
+            format!("the driving system itself failed in {} more", plural(self.ads_failed as usize, "play"))
         });
         let more = [
             (!reason.is_empty()).then_some(reason),
             found_with.map(|found| format!("found with `{found}`")),
             again,
+            ads_failed,
             (*is_recorded && self.outcome.was_played())
                 .then(|| "by its recorded answers, no program was asked".to_owned()),
         ];
@@ -618,7 +643,7 @@ impl Case {
 
     /// Whether the driving system still crashes, in this play or in one under other noise, or is itself what fails.
     fn is_failure(&self) -> bool {
-        self.outcome.is_failure() || self.in_words().0 == "still fails"
+        self.outcome.is_failure() || matches!(self.in_words().0, "still fails" | "ads failed")
     }
 }
 
@@ -738,6 +763,7 @@ mod tests {
             outcome,
             by: By::default(),
             again: None,
+            ads_failed: 0,
             below: 0.1,
             elapsed_s: 0.25,
         };

@@ -79,6 +79,7 @@ fn a_command_or_an_option_that_was_is_told_its_new_name() {
     for (words, now) in [
         (&["verify", "a.ava"][..], "`verify` is now `replay`"),
         (&["explain-policy", "a.ava"], "`explain-policy` is now `policy explain`"),
+        (&["run", "a.ava", "--replays", "5"], "`--replays` is now `--repeat N`"),
         (&["run", "a.ava", "--ads-config", "car.yaml"], "`--ads-config` is now `--ads FILE`"),
     ] {
         fails(words, now);
@@ -386,7 +387,7 @@ fn a_run_fails_on_what_is_asked_for() {
     assert!(status == 4 && told.contains("got stuck in 1 episode"), "{status}: {told}");
     // Nothing is begun that cannot be judged so.
     for (more, reason) in [
-        (&["--repeat", "0", "--fail-on", "recurring"][..], "needs replays"),
+        (&["--repeat", "0", "--fail-on", "recurring"][..], "needs at least 7 replays"),
         (&["--fail-on", "breach"], "needs a requirement"),
     ] {
         let (status, told) = run("none", more);

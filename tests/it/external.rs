@@ -431,11 +431,23 @@ fn a_finding_keeps_what_the_program_was_told_and_said() {
         "{}",
         asked[1]
     );
+    // Nothing else is replaced by it, whatever it is named.
+    let answers = file.replace(".ava", ".answers.jsonl");
+    let missing = path("missing/told.jsonl");
+    for (target, why) in
+        [(&file, "must end in"), (&answers, "holds something else"), (&missing, "does not exist")]
+    {
+        let (status, _, said) = outcome(&mut avastra(&["replay", &file, "--record", target]));
+        assert!(status == 1 && said.contains(why), "{target}: {said}");
+    }
+    assert!(done(&["replay", &file]).contains(" holds, ") && !Path::new(&missing).exists());
     // A driving system of avastra is told nothing by messages.
     let (status, _, said) =
-        outcome(&mut avastra(&["replay", &file, "--ads", "idm", "--record", &path("none")]));
+        outcome(&mut avastra(&["replay", &file, "--ads", "idm", "--record", &path("none.jsonl")]));
     assert!(
-        status == 1 && said.contains("is told nothing by messages") && !Path::new(&path("none")).exists()
+        status == 1
+            && said.contains("is told nothing by messages")
+            && !Path::new(&path("none.jsonl")).exists()
     );
 }
 

@@ -69,8 +69,7 @@ impl Recurrence {
         let with_more =
             |recurred| Recurrence { recurred: self.recurred + recurred, replays: self.replays + left };
         let is_open = with_more(left).recurs() || with_more(0).is_rare();
-        let can_answer = Recurrence { recurred: most, replays: most }.recurs();
-        left == 0 || self.recurs() || self.is_rare() || can_answer && !is_open
+        left == 0 || self.recurs() || self.is_rare() || can_tell(most) && !is_open
     }
 
     /// With one replay more.
@@ -97,6 +96,11 @@ impl Recurrence {
     pub fn in_words(self) -> String {
         format!("recurs in {self}")
     }
+}
+
+/// Whether so many replays can tell that a finding recurs: fewer than 7 cannot.
+pub fn can_tell(replays: u32) -> bool {
+    Recurrence { recurred: replays, replays }.recurs()
 }
 
 /// The text after a recurrence where chance of the program is mixed in; nothing elsewhere.
@@ -235,7 +239,7 @@ mod tests {
     fn a_finding_recurs_if_its_interval_lies_above_one_half() {
         let of = |recurred, replays| Recurrence { recurred, replays };
         assert!(of(17, 20).recurs() && !of(16, 20).recurs());
-        assert!(of(7, 7).recurs() && !of(6, 6).recurs());
+        assert!(can_tell(7) && !can_tell(6) && !can_tell(0));
         assert_eq!(of(14, 20).to_string(), "14 of 20 (0.36 to 0.93)");
         assert_eq!(
             [17, 16, 4, 3].map(|count| of(count, 20).word(false)),

@@ -4,12 +4,12 @@
 //! for its rear axle, or turn nowhere. Alone on the road nothing excuses that, so it fails the check there. In traffic a failure may
 //! be the driver's own, so it is told and no more.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use avastra_campaign::episode::{self, Choice, End, EpisodeLog};
 use avastra_campaign::run::{Arena, EpisodeSummary};
-use avastra_drivers::external::message::Answer;
-use avastra_drivers::external::{ExternalSettings, Outcome};
+use avastra_drivers::external::message::{Answer, TrajectoryMessage};
+use avastra_drivers::external::{ExternalSettings, Failure, Outcome};
 use avastra_world::sim::DT_S;
 use avastra_world::sim::{EgoMotion, VehicleParameters, World};
 use serde::Serialize;
@@ -21,6 +21,15 @@ use crate::cli::output::plural;
 const LIGHT: u32 = 6;
 /// What was asked is compared with what was done after so long, s: long enough for the lags of pedals and wheel.
 const AFTER_S: f64 = 1.0;
+
+/// Farther beside the route at the median it drives beside its lane's middle, m: the next lane begins 0.7 m farther. Ours.
+const BESIDE_M: f64 = 0.5;
+/// Farther at the median from where its trajectories want it, it plans from another place, m. Sound planners have 0.2. Ours.
+const ASTRAY_M: f64 = 0.5;
+/// Lines of standard error that are shown.
+const STDERR_LINES: usize = 12;
+/// Where an adapter's author looks if the vehicle is elsewhere.
+const REFERENCE: &str = "the route's `path` and `changes`, and whether the rear axle is its reference point";
 
 /// All drives alone, or all in light traffic.
 #[derive(Debug, Serialize)]
@@ -34,6 +43,9 @@ pub(super) struct Drives {
     /// Collisions that count, and all.
     counted: usize,
     collisions: usize,
+    /// The first failure of the program.
+    #[serde(skip)]
+    failure: Option<Failure>,
     /// How often each requirement is breached, with the first place.
     breaches: BTreeMap<String, Breached>,
     /// How far the rear axle is beside the route, outside of lane changes, m.
@@ -84,14 +96,15 @@ pub(super) fn drive(
             _ => format!("on {roads} among {ambient} vehicles"),
         };
         let text = drives.in_words(&place);
-        let passed = drives.faults() == 0;
-        let word = match (passed, ambient) {
-            (true, _) => "ok",
-            (false, 0) => "FAILS",
-            (false, _) => "look",
+        // Nothing excuses a failure of the program.
+        let excuses = ambient > 0 && drives.failure.is_none();
+        let word = match drives.faults() {
+            0 => "ok",
+            _ if excuses => "look",
+            _ => "FAILS",
         };
-        let part =
-            Part { stage, passed: passed || ambient > 0, found: text + &drives.advice(), failure: None };
+        let failure = drives.failure.clone();
+        let part = Part { stage, passed: word != "FAILS", found: text + &drives.advice(), failure };
         checks.note(word, part);
         found.push(drives);
     }
@@ -181,7 +194,7 @@ fn acceleration(answer: &Answer) -> Option<f64> {
 }
 
 /// Where a trajectory wants the rear axle at a time of the episode.
-fn place_at(wanted: &avastra_drivers::external::message::TrajectoryMessage, time_s: f64) -> [f64; 2] {
+fn place_at(wanted: &TrajectoryMessage, time_s: f64) -> [f64; 2] {
     let time_us = time_s * 1e6;
     let points = &wanted.points;
     let next = points.partition_point(|point| (point.t_us as f64) < time_us).clamp(1, points.len() - 1);
@@ -199,6 +212,7 @@ impl Drives {
             ended: BTreeMap::new(),
             counted: 0,
             collisions: 0,
+            failure: None,
             breaches: BTreeMap::new(),
             beside_m: None,
             astray_m: None,
@@ -225,6 +239,9 @@ impl Drives {
         self.drives += 1;
         self.counted += drive.counted;
         self.collisions += log.collisions.len();
+        if self.failure.is_none() {
+            self.failure.clone_from(&log.failure);
+        }
         match log.end {
             End::Arrived => self.arrived += 1,
             end => *self.ended.entry(end.name()).or_default() += 1,
@@ -240,7 +257,12 @@ impl Drives {
     /// How much should not be.
     fn faults(&self) -> usize {
         let breaches: usize = self.breaches.values().map(|breached| breached.times).sum();
-        self.ended.values().sum::<usize>() + self.counted + breaches
+        self.ended.values().sum::<usize>() + self.counted + breaches + usize::from(self.is_beside())
+    }
+
+    /// Whether it drives beside the route all along.
+    fn is_beside(&self) -> bool {
+        self.beside_m.is_some_and(|beside| beside.median > BESIDE_M)
     }
 
     fn in_words(&self, place: &str) -> String {
@@ -267,19 +289,23 @@ impl Drives {
             spread(self.astray_m, "after 1 s, from where the trajectory wants it", "m"),
             spread(self.off_mps, "after 1 s, from the speed that was asked for", "m/s"),
         ];
+        let failure = self.failure.as_ref().map_or_else(String::new, |failure| {
+            let lines = failure.stderr_lines(STDERR_LINES);
+            let lines = lines.iter().map(|line| format!("\n               | {line}"));
+            format!("\n               {}{}", failure.in_words(), lines.collect::<String>())
+        });
+        let figures = figures.concat() + &failure;
         format!(
             "{arrived} of {} {place} arrived{ended}; {hit}{breaches}{}",
             plural(*drives, "drive"),
-            figures.concat()
+            figures
         )
     }
 
     /// Where an adapter's author looks first.
     fn advice(&self) -> String {
         let ends = self.ended.keys().filter_map(|end| match *end {
-            "left_the_map" | "astray" => {
-                Some("the route's `path` and `changes`, and whether the rear axle is its reference point")
-            }
+            "left_the_map" | "astray" => Some(REFERENCE),
             "stalled" | "limit" => {
                 Some("what it waits for: `internal.reason` in an answer shows on the page")
             }
@@ -290,9 +316,7 @@ impl Drives {
             "stops_at_signs" => Some("`signs` of the route"),
             "keeps_the_limit" => Some("the speed limit in each point of the route's `path`"),
             "drives_by_sight" => Some("`conditions.visibility` of `step`"),
-            "keeps_to_its_side" | "stays_on_the_road" | "takes_its_turns" => {
-                Some("the route's `path` and `changes`, and whether the rear axle is its reference point")
-            }
+            "keeps_to_its_side" | "stays_on_the_road" | "takes_its_turns" => Some(REFERENCE),
             "goes_on" | "goes_at_green" | "lets_traffic_flow" => {
                 Some("what it waits for: `internal.reason` in an answer shows on the page")
             }
@@ -300,7 +324,9 @@ impl Drives {
         });
         let collisions = (self.counted > 0)
             .then_some("the place of `objects`: the middle of their outline, not its front or the rear axle");
-        let advice: std::collections::BTreeSet<&str> = ends.chain(breaches).chain(collisions).collect();
+        let is_elsewhere = self.is_beside() || self.astray_m.is_some_and(|astray| astray.median > ASTRAY_M);
+        let elsewhere = is_elsewhere.then_some(REFERENCE);
+        let advice: BTreeSet<&str> = ends.chain(breaches).chain(collisions).chain(elsewhere).collect();
         advice.iter().map(|text| format!("\n               look at {text}")).collect()
     }
 }
@@ -308,7 +334,7 @@ impl Drives {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use avastra_drivers::external::message::{TrajectoryMessage, TrajectoryPoint};
+    use avastra_drivers::external::message::TrajectoryPoint;
 
     #[test]
     fn the_place_that_is_wanted_lies_between_the_points() {

@@ -25,7 +25,8 @@ pub use link::end_all;
 pub use message::{AnswerKind, Observation, PROTOCOL, schemas};
 pub use program::Program;
 pub use record::{
-    Attached, Conversation, Key, Outcome, RecordError, Told, Transcript, digest_of, from_text, to_text,
+    Attached, Conversation, EVIDENCE, Key, Outcome, RecordError, Told, Transcript, digest_of, from_text,
+    to_text,
 };
 pub use sequences::odd_orders;
 pub use session::Identity;

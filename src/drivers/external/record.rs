@@ -16,6 +16,9 @@ use super::message::Answer;
 use super::session::Identity;
 use super::settings::ExternalSettings;
 
+/// The format of a file of evidence.
+pub const EVIDENCE: &str = "avastra-evidence/1";
+
 /// First words of a file of answers.
 const FORMAT: &str = "avastra-answers/1";
 
@@ -237,7 +240,7 @@ impl Conversation {
     /// All that was asked and answered, a line of JSON each after a head: for a reader, or for a planner's own tests.
     pub fn evidence(&self, scenario: &str) -> String {
         let head = serde_json::json!({
-            "format": "avastra-evidence/1", "scenario": scenario, "ads": self.attached.title(),
+            "format": EVIDENCE, "scenario": scenario, "ads": self.attached.title(),
         });
         let mut text = line(&head);
         for ((_, outcome), told) in self.exchanges.iter().zip(&self.transcript.0) {
