@@ -34,6 +34,9 @@ pub enum Failure {
     /// An external driving system failed.
     #[error("the driving system failed {count}", count = super::output::plural(*findings, "time"))]
     Ads { findings: usize },
+    /// Checks of an external driving system that it does not pass.
+    #[error("{count} not passed", count = super::output::plural(*checks, "check"))]
+    Unfit { checks: usize },
     /// An external driving system was given up: what was played is saved.
     #[error(
         "the driving system could not be reached again and again, so the rest was not played: {reason}\n  when it \
@@ -71,7 +74,7 @@ impl Failure {
             | Failure::NotPlayed { in_source: true, .. } => 2,
             Failure::Refuted { .. } => 3,
             Failure::Found { .. } | Failure::Failing { .. } => 4,
-            Failure::Ads { .. } | Failure::Unreached { .. } => 5,
+            Failure::Ads { .. } | Failure::Unfit { .. } | Failure::Unreached { .. } => 5,
             // A shell reports this status for a process that SIGINT ended.
             Failure::Stopped | Failure::Interrupted { .. } => 130,
         }

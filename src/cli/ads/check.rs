@@ -92,7 +92,7 @@ pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failu
         _ => "\nit cannot be put under test as it is",
     });
     output.result(serde_json::json!({ "checks": parts, "speed": speed, "drives": drives }));
-    if failed > 0 { Err(Failure::Ads { findings: failed }) } else { Ok(()) }
+    if failed > 0 { Err(Failure::Unfit { checks: failed }) } else { Ok(()) }
 }
 
 /// The paper's space, which is in the program, and the folder that it is written to. A planner may open the OpenDRIVE
