@@ -217,15 +217,12 @@ pub struct Told {
     pub tracks: Vec<(u32, Option<u32>)>,
 }
 
-/// One line of [`evidence`].
+/// One line of [`Conversation::evidence`], without its question, which is JSON already.
 #[derive(Serialize)]
 struct Evidence<'a> {
     /// Time of the episode, s; absent of a reset.
     #[serde(skip_serializing_if = "Option::is_none")]
     t_s: Option<f64>,
-    question: &'a serde_json::value::RawValue,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    event: Option<&'a serde_json::value::RawValue>,
     outcome: &'a Outcome,
     #[serde(skip_serializing_if = "Option::is_none")]
     took_ms: Option<f64>,
@@ -244,18 +241,18 @@ impl Conversation {
         });
         let mut text = line(&head);
         for ((_, outcome), told) in self.exchanges.iter().zip(&self.transcript.0) {
-            let mut lines = told.question.lines().rev();
-            let mut raw = || serde_json::from_str::<&serde_json::value::RawValue>(lines.next()?).ok();
-            let Some(question) = raw() else { continue };
-            text.push_str(&line(&Evidence {
+            let rest = line(&Evidence {
                 t_s: told.t_us.map(|t_us| t_us as f64 / 1e6),
-                question,
-                event: raw(),
                 outcome,
                 took_ms: told.took_s.map(|took_s| (took_s * 1e6).round() / 1e3),
                 stderr: &told.said,
                 npcs: told.tracks.iter().copied().collect(),
-            }));
+            });
+            // An event comes before its step.
+            let mut lines = told.question.lines().rev();
+            let question = lines.next().unwrap_or("null");
+            let event = lines.next().map_or(String::new(), |event| format!("\"event\":{event},"));
+            text.push_str(&format!("{{\"question\":{question},{event}{}", &rest[1..]));
         }
         text
     }
