@@ -100,7 +100,7 @@ fn a_branch_is_the_recorded_drive_until_it_begins() {
 /// The rise against 200 branches at each tenth of a second around it:
 /// `cargo test --release --test it -- --ignored --nocapture the_rise_lies_where_many_branches_put_it`
 #[test]
-#[ignore = "takes half an hour"]
+#[ignore = "takes an hour"]
 fn the_rise_lies_where_many_branches_put_it() {
     const MANY: u32 = 200;
     let mut off_s: Vec<f64> = Vec::new();
