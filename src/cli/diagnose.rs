@@ -19,6 +19,7 @@ use avastra_world::sim::Contact;
 
 use super::arguments::{CountedBy, DiagnoseArguments};
 use super::error::Failure;
+use super::findings::needs_program;
 use super::load;
 use super::look;
 use super::output::{Output, plural};
@@ -210,12 +211,9 @@ fn moments(output: &Output, arguments: &DiagnoseArguments, asked: &Asked) -> Res
         let (table, scenario) = look::unchanged(output, file)?;
         let Case { stage, ads, log, found } = Case::of(&table, &scenario, asked)?;
         if !oracle::can_replay(&ads) {
-            return Err(Failure::usage(format!(
-                "`{}` was made against an external driving system, which must drive each branch: give it with `--ads`",
-                scenario.name
-            )));
+            return Err(needs_program(&scenario.name, "branch"));
         }
-        let risen = oracle::no_return(&stage.setup(&ads), &log, found, oracle::BRANCHES);
+        let risen = oracle::no_return(&stage.setup(&ads), &log, found, oracle::REPLAYS);
         Ok((file.clone(), scenario.name.clone(), found.noun(), risen))
     })?;
     for (file, _, noun, risen) in &found.done {

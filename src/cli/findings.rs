@@ -105,6 +105,13 @@ pub fn spot_check<'a>(program: Option<&Arc<Program>>, files: impl Iterator<Item 
     }
 }
 
+/// The failure of a command that needs a driving system of which only the recorded answers are there.
+pub fn needs_program(scenario: &str, each: &str) -> Failure {
+    Failure::usage(format!(
+        "`{scenario}` was made against an external driving system, which must drive each {each}: give it with `--ads`"
+    ))
+}
+
 /// Why a command stops before all is played: Ctrl-C, or a driving system that was given up.
 pub fn unfinished(command: &'static str, directory: PathBuf, program: Option<&Arc<Program>>) -> Failure {
     match program.and_then(|program| program.given_up()) {

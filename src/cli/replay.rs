@@ -1,6 +1,5 @@
 //! `avastra replay`: plays emitted scenarios and policies again and checks every claim.
 
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use avastra_base::outside::Shown;
@@ -18,6 +17,7 @@ use avastra_world::action::ActionTable;
 use super::arguments::ReplayArguments;
 use super::error::Failure;
 use super::files::{must_end_in, write_named};
+use super::findings::needs_program;
 use super::load;
 use super::look::{self, Changed, Looked};
 use super::output::{Output, for_shell, plural};
@@ -267,10 +267,7 @@ fn play(
         }
     };
     if *repeat > 0 && !oracle::can_replay(ads) {
-        return Err(Failure::usage(format!(
-            "`--repeat`: `{}` was made against an external driving system, which must drive each replay: give it with `--ads`",
-            scenario.name
-        )));
+        return Err(needs_program(&scenario.name, "replay"));
     }
     let again = recurrences((table, scenario), &stage, (ads, &log), *repeat);
     let is_mixed = mixed_text(doubted.is_some());
@@ -352,12 +349,12 @@ fn recurrences(
         requirement: None,
         recurrence: tested(Found::Collision(index)),
     });
-    let mut known = BTreeSet::new();
-    let firsts = log.breaches.iter().enumerate().filter(|(_, breach)| known.insert(breach.requirement));
-    let breaches = firsts.map(|(index, breach)| Again {
-        obstacle: None,
-        requirement: Some(table.space().requirements[breach.requirement].name.to_string()),
-        recurrence: tested(Found::Breach(index)),
+    let breaches = log.first_breaches().filter_map(|breach| {
+        Some(Again {
+            obstacle: None,
+            requirement: Some(table.space().requirements[breach.requirement].name.to_string()),
+            recurrence: tested(Found::Breach(log.first_breach(breach.requirement)?)),
+        })
     });
     collisions.chain(breaches).collect()
 }

@@ -14,6 +14,7 @@ use avastra_lang::model::{Claim, Space};
 use super::arguments::ShrinkArguments;
 use super::error::Failure;
 use super::files::{folder, make, without_links, write_answers, write_result};
+use super::findings::needs_program;
 use super::findings::{is_reproducible, spot_check};
 use super::load;
 use super::look;
@@ -192,10 +193,7 @@ fn smaller(
     let (table, scenario) = look::unchanged(output, file)?;
     let (ads, _) = asked.selected_for(&scenario)?;
     if ads.program().is_some_and(|program| !program.can_start()) {
-        return Err(Failure::usage(format!(
-            "`{}` was made against an external driving system, which must drive each try: give it with `--ads`",
-            scenario.name
-        )));
+        return Err(needs_program(&scenario.name, "try"));
     }
     let stage = Stage::new(&table, &scenario)?;
     let (log, judgements, found) = stage.first_found(&ads);

@@ -5,7 +5,7 @@ use std::path::Path;
 use avastra::action::ActionTable;
 use avastra::episode::{EpisodeLog, Moment, Script, Setup, run, run_watched};
 use avastra::geometry::Vec2;
-use avastra::oracle::{BRANCHES, Found, no_return};
+use avastra::oracle::{Found, REPLAYS, no_return};
 use avastra::rng::{Stream, child_seed};
 use avastra::run::Stage;
 use avastra::sim::{DT_S, Start, World};
@@ -105,7 +105,7 @@ fn the_rise_lies_where_many_branches_put_it() {
     const MANY: u32 = 200;
     let mut off_s: Vec<f64> = Vec::new();
     each_crash("1", "100", |name, setup, log, index| {
-        let found = no_return(setup, log, Found::Collision(index), BRANCHES);
+        let found = no_return(setup, log, Found::Collision(index), REPLAYS);
         let Some(rises_s) = found.rises_s else { return false };
         let last = ((found.found_s - rises_s) * 10.0).floor().min(10.0) as i32;
         let times: Vec<f64> = (-10..=last).map(|tenth| rises_s + f64::from(tenth) / 10.0).collect();

@@ -15,6 +15,8 @@ import tarfile
 import urllib.parse
 import urllib.request
 
+from pip._internal.models.index import PyPI
+
 ARCHIVE = "pufferlib-3.0.0.tar.gz"
 SHA256 = "7df3a3e3f5f894d78d2a1f5374097890aec01473183e748abefe4f3faa10eaa9"
 WANTED = ("pufferlib-3.0.0/pufferlib/resources/gpudrive/gpudrive_weights.bin", "pufferlib-3.0.0/LICENSE")
@@ -34,7 +36,7 @@ class Links(html.parser.HTMLParser):
 def index():
     """The package index that pip is set to."""
     asked = subprocess.run([sys.executable, "-m", "pip", "config", "get", "global.index-url"], capture_output=True, text=True)
-    return os.environ.get("PIP_INDEX_URL") or asked.stdout.strip() or "https://pypi.org/simple"
+    return os.environ.get("PIP_INDEX_URL") or asked.stdout.strip() or PyPI.simple_url
 
 
 def fetch():

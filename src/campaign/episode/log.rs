@@ -172,6 +172,11 @@ impl EpisodeLog {
         self.breaches.iter().enumerate().filter(is_first).map(|(_, breach)| breach)
     }
 
+    /// The index of the first breach of a requirement, by its number in the space.
+    pub fn first_breach(&self, requirement: usize) -> Option<usize> {
+        self.breaches.iter().position(|breach| breach.requirement == requirement)
+    }
+
     /// The first breach of a requirement of the space that was played, by its name.
     pub fn breach_of(&self, space: &Space, requirement: &str) -> Option<&Breach> {
         self.breaches.iter().find(|breach| space.requirements[breach.requirement].name == requirement)

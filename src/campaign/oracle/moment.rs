@@ -16,7 +16,7 @@ use avastra_world::sim::Start;
 
 use super::avoidable::avoidable_until;
 use super::case::{Case, Found};
-use super::recurrence::{REPLAYS, Recurrence};
+use super::recurrence::Recurrence;
 
 /// Moments are looked at from this long before the finding on, s: as far as careful drivers are taken back.
 const LOOK_BACK_S: f64 = 8.0;
@@ -159,9 +159,6 @@ fn branch(case: &Case, time_s: f64, number: u32) -> EpisodeLog {
     Case { setup: &setup, script: case.script.clone(), what: case.what }
         .play(&ads.clone().until(time_s, successor))
 }
-
-/// Branches of a moment, if nobody says otherwise.
-pub const BRANCHES: u32 = REPLAYS;
 
 #[cfg(test)]
 mod tests {

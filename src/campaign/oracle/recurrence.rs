@@ -18,7 +18,7 @@ use avastra_world::sim::Start;
 
 use super::case::{Case, Fate, Found};
 
-/// Most replays of a finding, if nobody says otherwise.
+/// Most replays of a finding by default.
 pub const REPLAYS: u32 = 20;
 
 /// How often a finding happened again. The test is sequential: it looks after each replay, and its 95 % intervals hold
@@ -116,7 +116,7 @@ impl fmt::Display for Recurrence {
     }
 }
 
-/// Plays of the scenario of an episode under other chance, as far as somebody asked for them.
+/// The scenario of an episode, played under other chance. A play is made when it is first asked for.
 pub struct Replayed<'a> {
     setup: &'a Setup,
     log: &'a EpisodeLog,
@@ -193,7 +193,7 @@ impl<'a> Replayed<'a> {
         so_far
     }
 
-    /// What somebody sees in the nth play, from 1.
+    /// Looks at the nth play, from 1.
     fn nth<T>(&self, number: u32, look: impl FnOnce(&EpisodeLog) -> T) -> T {
         let mut again = self.again.borrow_mut();
         while again.len() < number as usize {

@@ -342,7 +342,7 @@ impl<'a> Search<'a> {
                 (Found::Collision((0..log.collisions.len()).find(same)?), judgements)
             }
             Wanted::Breach { requirement, is_kept: was_kept } => {
-                let index = log.breaches.iter().position(|breach| breach.requirement == requirement)?;
+                let index = log.first_breach(requirement)?;
                 if is_kept(&setup, &log, requirement) != was_kept {
                     return None;
                 }

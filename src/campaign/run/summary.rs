@@ -131,10 +131,8 @@ impl EpisodeSummary {
         let counted = self.collisions.iter().filter(|finding| finding.counted);
         let collisions: Vec<_> =
             counted.map(|finding| again.tested(Found::Collision(finding.number), most)).collect();
-        let first = |found: &Breached| {
-            let first = log.breaches.iter().position(|breach| breach.requirement == found.requirement)?;
-            Some(again.tested(Found::Breach(first), most))
-        };
+        let first =
+            |found: &Breached| Some(again.tested(Found::Breach(log.first_breach(found.requirement)?), most));
         let breaches: Vec<_> = self.breached.iter().map(first).collect();
         // A driving system that was given up meanwhile drove only some of them.
         if !can_replay(&setup.ads) {

@@ -32,7 +32,7 @@ const STEPS: usize = 5;
 /// Steps of the episode that is broken off for a reset.
 const BROKEN_OFF_STEPS: usize = 2;
 /// Lines of standard error that are shown.
-const STDERR_LINES: usize = 12;
+pub(super) const STDERR_LINES: usize = 12;
 
 /// The result of one check.
 #[derive(Debug, Serialize)]

@@ -1,8 +1,8 @@
 //! `avastra ads check --drive`: how a driving system drives each road alone and in light traffic, under the law.
 //!
 //! A program that follows the protocol may still be unfit to be tested. Its adapter may drop the lights, take the vehicle's centre
-//! for its rear axle, or turn nowhere. Alone on the road nothing excuses that, so it fails the check there. In traffic a failure may
-//! be the driver's own, so it is told and no more.
+//! for its rear axle, or turn nowhere. Alone on the road nothing excuses that, so it fails the check there. In traffic a fault may be
+//! the driver's own, so it is told and no more. A program that crashes or hangs fails the check anywhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,11 +10,10 @@ use avastra_campaign::episode::{self, Choice, End, EpisodeLog};
 use avastra_campaign::run::{Arena, EpisodeSummary};
 use avastra_drivers::external::message::{Answer, TrajectoryMessage};
 use avastra_drivers::external::{ExternalSettings, Failure, Outcome};
-use avastra_world::sim::DT_S;
-use avastra_world::sim::{EgoMotion, VehicleParameters, World};
+use avastra_world::sim::{DT_S, EgoMotion, VehicleParameters, World};
 use serde::Serialize;
 
-use super::check::{Checks, Part};
+use super::check::{Checks, Part, STDERR_LINES};
 use crate::cli::output::plural;
 
 /// Vehicles of light traffic.
@@ -26,13 +25,12 @@ const AFTER_S: f64 = 1.0;
 const BESIDE_M: f64 = 0.5;
 /// Farther at the median from where its trajectories want it, it plans from another place, m. Sound planners have 0.2. Ours.
 const ASTRAY_M: f64 = 0.5;
-/// Lines of standard error that are shown.
-const STDERR_LINES: usize = 12;
-/// Where an adapter's author looks if the vehicle is elsewhere.
+/// Where an adapter's author looks if the vehicle stands, and if it is elsewhere.
+const WAITS: &str = "what it waits for: `internal.reason` in an answer shows on the page";
 const REFERENCE: &str = "the route's `path` and `changes`, and whether the rear axle is its reference point";
 
 /// All drives alone, or all in light traffic.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Default, Serialize)]
 pub(super) struct Drives {
     /// Vehicles of ordinary traffic.
     ambient: u32,
@@ -74,8 +72,7 @@ struct Spread {
 impl Spread {
     fn of(mut values: Vec<f64>) -> Option<Spread> {
         values.sort_by(f64::total_cmp);
-        let at =
-            |share: f64| values.get(((values.len() as f64 * share) as usize).min(values.len().max(1) - 1));
+        let at = |share: f64| values.get((values.len() as f64 * share) as usize);
         Some(Spread { median: *at(0.5)?, most_of_99: *at(0.99)? })
     }
 }
@@ -205,19 +202,7 @@ fn place_at(wanted: &TrajectoryMessage, time_s: f64) -> [f64; 2] {
 
 impl Drives {
     fn of(arena: &Arena, settings: &ExternalSettings, (seed, times): (u64, u32), ambient: u32) -> Drives {
-        let mut all = Drives {
-            ambient,
-            drives: 0,
-            arrived: 0,
-            ended: BTreeMap::new(),
-            counted: 0,
-            collisions: 0,
-            failure: None,
-            breaches: BTreeMap::new(),
-            beside_m: None,
-            astray_m: None,
-            off_mps: None,
-        };
+        let mut all = Drives { ambient, ..Drives::default() };
         let (mut beside_m, mut places_m, mut speeds_mps) = (Vec::new(), Vec::new(), Vec::new());
         for road in 0..arena.roads() {
             for time in 0..times {
@@ -306,9 +291,7 @@ impl Drives {
     fn advice(&self) -> String {
         let ends = self.ended.keys().filter_map(|end| match *end {
             "left_the_map" | "astray" => Some(REFERENCE),
-            "stalled" | "limit" => {
-                Some("what it waits for: `internal.reason` in an answer shows on the page")
-            }
+            "stalled" | "limit" => Some(WAITS),
             _ => None,
         });
         let breaches = self.breaches.keys().filter_map(|name| match name.as_str() {
@@ -317,9 +300,7 @@ impl Drives {
             "keeps_the_limit" => Some("the speed limit in each point of the route's `path`"),
             "drives_by_sight" => Some("`conditions.visibility` of `step`"),
             "keeps_to_its_side" | "stays_on_the_road" | "takes_its_turns" => Some(REFERENCE),
-            "goes_on" | "goes_at_green" | "lets_traffic_flow" => {
-                Some("what it waits for: `internal.reason` in an answer shows on the page")
-            }
+            "goes_on" | "goes_at_green" | "lets_traffic_flow" => Some(WAITS),
             _ => None,
         });
         let collisions = (self.counted > 0)

@@ -57,8 +57,8 @@ pub struct DiagnoseArguments {
     /// alone makes vanish.
     #[arg(long)]
     pub mechanisms: bool,
-    /// Instead of modules, the moment of no return, of any driving system: how likely the finding was at each moment before it,
-    /// in branches under other noise from there on, and until when a careful driver could have taken over.
+    /// Instead of modules, the moment of no return, of any driving system. It says how likely the finding was at each moment before
+    /// it, and until when a careful driver could have avoided it. At each moment, branches begin under other noise.
     #[arg(long, conflicts_with_all = ["mechanisms", "likelihood", "baseline"])]
     pub moment: bool,
     /// What several findings are counted by: the modules at fault, or the smallest change that removes each.

@@ -53,22 +53,17 @@ pub struct External {
 #[derive(Clone)]
 struct Exchange {
     key: Key,
-    question: Arc<str>,
     /// Number and time, µs, of the step that it asks; `None` of a reset.
     step: Option<(u64, u64)>,
     outcome: Outcome,
-    aside: Aside,
+    told: Arc<Told>,
 }
 
-/// What is known of a question beside its outcome.
-#[derive(Clone, Default)]
-struct Aside {
-    /// How long the answer took, s, if a process was asked.
+/// What a process answered.
+struct Answered {
+    outcome: Outcome,
     took_s: Option<f64>,
-    /// What the process wrote to standard error meanwhile.
     said: String,
-    /// The tracks that it was told of, with the road users that they are; `None` is a ghost.
-    tracks: Vec<(u32, Option<u32>)>,
 }
 
 /// The process that answers, with the number of exchanges that it took part in. A copy has none.
@@ -146,11 +141,15 @@ impl External {
         tracks: Vec<(u32, Option<u32>)>,
     ) -> Option<Outcome> {
         let key = before.then(&question);
-        let mut aside = Aside::default();
+        let (mut took_s, mut said) = (None, String::new());
         let outcome = self.program.known(key).unwrap_or_else(|| {
-            let outcome = self
-                .asked(&question, step, &mut aside)
-                .unwrap_or_else(|failure| Outcome::Failed(failure.into()));
+            let outcome = match self.asked(&question, step) {
+                Ok(answered) => {
+                    (took_s, said) = (answered.took_s, answered.said);
+                    answered.outcome
+                }
+                Err(failure) => Outcome::Failed(failure.into()),
+            };
             if matches!(&outcome, Outcome::Answer(answer) if answer.is_extreme()) {
                 self.program.cut_off();
             }
@@ -164,26 +163,21 @@ impl External {
             self.failure = Some(Arc::clone(failure));
             self.live = Live::default();
         }
-        let aside = Aside { tracks, ..aside };
-        self.exchanges.push(Exchange { key, question, step, outcome: outcome.clone(), aside });
+        let told = Told { question, t_us: step.map(|(_, t_us)| t_us), took_s, said, tracks };
+        self.exchanges.push(Exchange { key, step, outcome: outcome.clone(), told: Arc::new(told) });
         self.failure.is_none().then_some(outcome)
     }
 
     /// Asks a process, which first is shown all that it has missed of the episode.
-    fn asked(
-        &mut self,
-        question: &str,
-        step: Option<(u64, u64)>,
-        aside: &mut Aside,
-    ) -> Result<Outcome, Failure> {
+    fn asked(&mut self, question: &str, step: Option<(u64, u64)>) -> Result<Answered, Failure> {
         let up_to_date = self.live.0.take().filter(|(_, seen)| *seen == self.exchanges.len());
         let mut session = match up_to_date {
             Some((session, _)) => session,
             None => self.caught_up()?,
         };
-        let outcome = self.answer(&mut session, question, step, aside)?;
+        let answered = self.answer(&mut session, question, step)?;
         self.live = Live(Some((session, self.exchanges.len() + 1)));
-        Ok(outcome)
+        Ok(answered)
     }
 
     /// A process that has the map and was shown this episode so far.
@@ -202,12 +196,12 @@ impl External {
             session.map = Some(self.map.key.0);
         }
         for exchange in &self.exchanges {
+            let question = &exchange.told.question;
             if matches!(exchange.outcome, Outcome::Missed) {
-                session.pass(&exchange.question);
+                session.pass(question);
                 continue;
             }
-            let mut aside = Aside::default();
-            let again = self.answer(&mut session, &exchange.question, exchange.step, &mut aside)?;
+            let again = self.answer(&mut session, question, exchange.step)?.outcome;
             // A program that says it may answer otherwise is not at fault when it does.
             if self.program.is_deterministic() && !again.means(&exchange.outcome) {
                 let stage = exchange.step.map_or("reset".to_owned(), |(seq, _)| format!("step {seq}"));
@@ -228,29 +222,25 @@ impl External {
         session: &mut Session,
         question: &str,
         step: Option<(u64, u64)>,
-        aside: &mut Aside,
-    ) -> Result<Outcome, Failure> {
+    ) -> Result<Answered, Failure> {
         let settings = self.program.settings();
         let Some((seq, t_us)) = step else {
             session.ready(question, "reset", settings.timeouts.reset_s)?;
-            aside.said = session.said();
-            return Ok(Outcome::Ready);
+            return Ok(Answered { outcome: Outcome::Ready, took_s: None, said: session.said() });
         };
         let waits_for_late = settings.on_timeout == OnTimeout::Strict;
         let patience = Patience { limit_s: settings.timeouts.step_s, waits_for_late };
-        let answered = session.step(question, (seq, t_us), patience)?;
-        aside.said = session.said();
-        match answered {
+        let (outcome, took_s) = match session.step(question, (seq, t_us), patience)? {
             Some((answer, took_s)) => {
                 self.program.thought(took_s);
-                aside.took_s = Some(took_s);
-                Ok(Outcome::answered(answer))
+                (Outcome::answered(answer), Some(took_s))
             }
             None => {
                 self.program.miss();
-                Ok(Outcome::Missed)
+                (Outcome::Missed, None)
             }
-        }
+        };
+        Ok(Answered { outcome, took_s, said: session.said() })
     }
 
     /// Pedals and wheel for this tick.
@@ -342,11 +332,8 @@ impl Ads for External {
 
     fn conversation(&self) -> Option<Conversation> {
         let exchanges = self.exchanges.iter().map(|exchange| (exchange.key, exchange.outcome.clone()));
-        let told = self.exchanges.iter().map(|exchange| {
-            let Exchange { question, step, aside: Aside { took_s, said, tracks }, .. } = exchange.clone();
-            Told { question, t_us: step.map(|(_, t_us)| t_us), took_s, said, tracks }
-        });
-        let transcript = Transcript(told.collect());
+        let transcript =
+            Transcript(self.exchanges.iter().map(|exchange| Arc::clone(&exchange.told)).collect());
         Some(Conversation { attached: self.program.attached(), exchanges: exchanges.collect(), transcript })
     }
 }

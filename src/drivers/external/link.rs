@@ -111,7 +111,7 @@ pub struct Link {
     /// The process has ended, though its output is open.
     is_orphaned: bool,
     stderr: Vec<u8>,
-    /// Standard error that nobody took yet.
+    /// Standard error since [`Link::said`].
     said: Vec<u8>,
     /// Bytes of standard error since the episode began.
     flood_bytes: u64,

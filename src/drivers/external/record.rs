@@ -1,7 +1,7 @@
 //! The answers of an episode, and their file: `NAME.answers.jsonl` beside a scenario.
 //!
 //! A question is known by a digest of the conversation up to it, so an answer is found again only where everything
-//! before was the same. The questions are not kept: they follow from the episode.
+//! before was the same. The file has no questions: they follow from the episode. [`Conversation::evidence`] tells both.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -194,7 +194,7 @@ pub struct Conversation {
 /// The questions of a conversation, and what is known beside their answers. What a clock or a process said is no part of an
 /// episode, so any two are equal.
 #[derive(Debug, Clone, Default)]
-pub struct Transcript(pub Vec<Told>);
+pub struct Transcript(pub Vec<Arc<Told>>);
 
 impl PartialEq for Transcript {
     fn eq(&self, _: &Transcript) -> bool {
