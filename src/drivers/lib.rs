@@ -31,6 +31,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod altered;
 mod blind;
 mod driver;
 pub mod external;
@@ -48,6 +49,7 @@ mod testing;
 #[cfg(test)]
 mod tests;
 
+pub use altered::Alteration;
 pub use driver::Ads;
 pub use frenet::Frenet;
 pub use modular::{ConfigError, Foresight, Modular, ModularConfig, Module, Weaknesses};

@@ -6,6 +6,7 @@ use avastra_base::rng;
 use avastra_base::rng::Stream;
 use avastra_world::sim::Scene;
 
+use super::altered::{Alteration, Altered};
 use super::driver::Ads;
 use super::external::{External, Program};
 use super::handover::Handover;
@@ -23,6 +24,8 @@ pub struct Selected {
     foresight: Option<Arc<Foresight>>,
     /// The number of other errors than those of the episode's seed.
     noise: Option<u32>,
+    /// What it is told, or what becomes of its commands, is changed from a moment on, s; the first nearest to it.
+    alterations: Vec<(Alteration, f64)>,
     /// The driving system that takes over, and when, s.
     successor: Option<(Box<Selected>, f64)>,
 }
@@ -44,13 +47,27 @@ impl Selected {
     /// The driving system with its default settings.
     pub fn new(entry: &'static Entry) -> Selected {
         let profile = (entry.name == MODULAR).then(ModularConfig::default);
-        Selected { kind: Kind::Ours(entry), profile, foresight: None, noise: None, successor: None }
+        Selected {
+            kind: Kind::Ours(entry),
+            profile,
+            foresight: None,
+            noise: None,
+            alterations: Vec::new(),
+            successor: None,
+        }
     }
 
     /// A driving system outside this program.
     pub fn external(program: Arc<Program>) -> Selected {
         let kind = Kind::External(program);
-        Selected { kind, profile: None, foresight: None, noise: None, successor: None }
+        Selected {
+            kind,
+            profile: None,
+            foresight: None,
+            noise: None,
+            alterations: Vec::new(),
+            successor: None,
+        }
     }
 
     /// With a profile.
@@ -72,6 +89,13 @@ impl Selected {
     /// With other errors of its sensors in the same episode: a number for each.
     pub fn with_other_noise(self, number: u32) -> Selected {
         Selected { noise: Some(number), ..self }
+    }
+
+    /// Behind a change, from a moment of the episode on, s; outside of those that it has already.
+    #[must_use]
+    pub fn altered(mut self, alteration: Alteration, from_s: f64) -> Selected {
+        self.alterations.push((alteration, from_s));
+        self
     }
 
     /// Drives up to a moment of the episode, s; from there on `successor` drives, which has watched until then.
@@ -114,6 +138,10 @@ impl Selected {
             (Kind::Ours(entry), None) => (entry.build)(scene, own_seed),
             (Kind::External(program), None) => Box::new(External::new(program, scene, own_seed)),
         };
+        let first = self
+            .alterations
+            .iter()
+            .fold(first, |ads, (alteration, from_s)| Box::new(Altered::new(ads, *alteration, *from_s)));
         match &self.successor {
             Some((second, at_s)) => Box::new(Handover::new(first, second.build(scene, seed), *at_s)),
             None => first,

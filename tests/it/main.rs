@@ -53,6 +53,7 @@ mod studies;
 mod suites;
 mod sureness;
 mod surveys;
+mod swaps;
 mod tables;
 mod told;
 mod traces;

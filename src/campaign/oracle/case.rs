@@ -15,6 +15,10 @@ use super::avoidable::judge;
 use super::counted::counted_at_need;
 use crate::episode::at_fault;
 
+/// A hazard begins at most this long before its collision, s: longer than any reaction or braking, because
+/// ambient traffic may have appeared long before.
+const LOOK_BACK_S: f64 = 15.0;
+
 /// A finding of an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Found {
@@ -174,6 +178,15 @@ impl<'a> Case<'a> {
             What::Collision { collision, .. } => collision.contact.time_s,
             What::Breach(breach) => breach.time_s,
         }
+    }
+
+    /// The beginning of the hazard, s: when its obstacle appeared, but at most [`LOOK_BACK_S`] before.
+    pub fn begins_s(&self) -> f64 {
+        let begun_s = match self.what {
+            What::Collision { collision, .. } => collision.spawned_s,
+            What::Breach(_) => 0.0,
+        };
+        begun_s.max(self.time_s() - LOOK_BACK_S)
     }
 
     /// Plays the script with a driving system.

@@ -19,7 +19,7 @@ use std::sync::Arc;
 use crate::episode::{EpisodeLog, Setup};
 use avastra_drivers::{Foresight, ModularConfig, Module};
 
-use super::case::{Case, Fate, Found, What, play};
+use super::case::{Case, Fate, Found, play};
 use super::evidence::{
     Chance, Comparison, Diagnosis, Evidence, ModuleFinding, PairFinding, WeaknessFinding, is_told_apart,
 };
@@ -31,11 +31,7 @@ const AGAIN: usize = 12;
 /// Most replays with other noise: a collision that happens in a tenth of them can be explained.
 const REPLAYS_MAX: u32 = 100;
 /// If it happens again fewer times than this, no change can be told apart from chance, and none is tried.
-const AGAIN_MIN: usize = 6;
-
-/// The takeover is at most this long before the collision, s: longer than any reaction or braking, because
-/// ambient traffic may have appeared long before.
-const LOOK_BACK_S: f64 = 15.0;
+pub(super) const AGAIN_MIN: usize = 6;
 
 /// Why no cause can be found.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -86,12 +82,7 @@ impl<'a> Inquiry<'a> {
         let ads = &case.setup.ads;
         let profile = *ads.profile().ok_or_else(|| NoModules { ads: ads.title() })?;
         let (_, foresight) = play(case.setup, |moment| case.script.choose(moment));
-        let begun_s = match case.what {
-            What::Collision { collision, .. } => collision.spawned_s,
-            What::Breach(_) => 0.0,
-        };
-        let from_s = begun_s.max(case.time_s() - LOOK_BACK_S);
-        Ok(Inquiry { case, profile, foresight, from_s })
+        Ok(Inquiry { case, profile, foresight, from_s: case.begins_s() })
     }
 
     /// The fate of the collision if another profile takes over when its obstacle appears.
@@ -227,6 +218,10 @@ impl<'a> Inquiry<'a> {
         found.into_iter().map(|(_, pair)| pair).collect()
     }
 
+    fn unchanged(&self) -> Vec<bool> {
+        unchanged(|noise| self.vanishes(&self.profile, noise))
+    }
+
     /// Plays the collision again with other noise and with each single change that prevents it.
     fn tell_apart(&self, evidence: &mut Evidence, baseline: &ModularConfig, unchanged: &[bool]) {
         let (own, differs) = (self.profile, evidence.differs());
@@ -271,23 +266,23 @@ impl<'a> Inquiry<'a> {
     fn replayed(&self, profile: &ModularConfig, replays: usize) -> Vec<bool> {
         (1..=replays as u32).map(|noise| self.vanishes(profile, noise)).collect()
     }
+}
 
-    /// Whether the collision vanishes in each replay with other noise and nothing else changed: until it has happened
-    /// [`AGAIN`] times again, but at most [`REPLAYS_MAX`]. When to end does not depend on what changes do.
-    fn unchanged(&self) -> Vec<bool> {
-        let mut vanished = Vec::new();
-        for noise in 1..=REPLAYS_MAX {
-            vanished.push(self.vanishes(&self.profile, noise));
-            if again(&vanished) == AGAIN {
-                break;
-            }
+/// Whether the collision vanishes in each replay with other noise and nothing else changed: until it has happened
+/// [`AGAIN`] times again, but at most [`REPLAYS_MAX`]. When to end does not depend on what changes do.
+pub(super) fn unchanged(vanishes: impl Fn(u32) -> bool) -> Vec<bool> {
+    let mut vanished = Vec::new();
+    for noise in 1..=REPLAYS_MAX {
+        vanished.push(vanishes(noise));
+        if again(&vanished) == AGAIN {
+            break;
         }
-        vanished
     }
+    vanished
 }
 
 /// The number of replays in which the collision happens again.
-fn again(vanished: &[bool]) -> usize {
+pub(super) fn again(vanished: &[bool]) -> usize {
     vanished.iter().filter(|vanished| !**vanished).count()
 }
 

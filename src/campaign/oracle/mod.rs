@@ -15,6 +15,7 @@ mod moment;
 mod recurrence;
 mod severity;
 mod shrink;
+mod swaps;
 #[cfg(test)]
 mod tests;
 mod variation;
@@ -38,5 +39,6 @@ pub use moment::{Branched, NoReturn, no_return};
 pub use recurrence::{MIXED, REPLAYS, Recurrence, Replayed, can_replay, can_tell, mixed_text};
 pub use severity::{Harm, Severity, severity};
 pub use shrink::{Shrunk, Worth, shrink, spare_steps};
+pub use swaps::{Change, HangsOn, Response, Swap, Swaps, swaps};
 pub use variation::{Likelihood, likelihood};
 pub use verify::{ClaimResult, NoTries, Replays, verify};
