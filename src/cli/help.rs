@@ -92,9 +92,9 @@ merge shards/* --missing # which shards are to be played again
 replay runs/0001/critical/*.ava # check every claim
 replay policies/corner.ava # play the evaluation of a policy again
 replay runs/0001/critical/corner_0004.ava --ads idm # the same scene, another driver
-diagnose runs/0001/critical/corner_0004.ava # which module is at fault
+diagnose runs/0001/critical/corner_0004.ava # what the crash hangs on
 diagnose --moment runs/0001/critical/corner_0004.ava # from when on it was certain
-diagnose --mechanisms runs/0001/critical/*.ava # which weakness, over all files
+diagnose runs/0001/critical/*.ava # how often each cause is at fault
 shrink runs/0001/critical/*.ava # write the smallest that still crash
 test runs/0001 # do its scenarios still crash?
 test runs/0001 --ads scenarios/ads/cautious.yaml --junit out.xml
@@ -148,6 +148,7 @@ const MOVED: &[(&str, &str)] = &[
     ("--ads-cmd", "--ads 'COMMAND'"),
     ("--compare", "--ads DRIVER"),
     ("--replays", "--repeat N"),
+    ("--likelihood", "diagnose --moment"),
     ("--fail-on-collision", "--fail-on collision"),
     ("--fail-on-breach", "--fail-on breach"),
 ];

@@ -233,11 +233,8 @@ replay
     on; collisions and how hard they were; the `crashes` of other road users into each other; the `breaches` of requirements: which, from when to when, the smallest `margin`
   FAILED
 diagnose
-  causes[] object? `cause` (one or two modules, or none) and `count`
-  cures[] object? `cure` (the smallest change that removes a finding) and `count`
-  mechanisms[] object? with `--mechanisms`: a weakness and what vanishes without it
-  placebo object? with `--mechanisms`: what vanishes by other sensor noise alone
-  scenarios[] object `file`, `scenario`; its `diagnosis`, or with `--mechanisms` `without` and `placebo`; with `--moment` when it happened (`found_s`), the `moments` looked at with the branches in which it happened again (`recurred` of `replays`), when more than three quarters did (`rises_s`), and `avoidable_until_s`
+  causes[] object? `cause` (one or two modules, what the finding hangs on, or none) and `count`
+  scenarios[] object `file`, `scenario`; of `modular` its `diagnosis`, of others the `swaps`: what was changed, what became of it, and what it `hangs_on`; with `--moment` when it happened (`found_s`), the `moments` looked at with the branches in which it happened again (`recurred` of `replays`), when more than three quarters did (`rises_s`), and `avoidable_until_s`
   FAILED
 shrink
   median_steps_before number

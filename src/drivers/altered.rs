@@ -42,14 +42,18 @@ pub enum Alteration {
     Larger(f64),
     /// Left and right are exchanged.
     Mirrored,
-    /// It is told of a car that stands here, with its centre at this pose, and is not there.
-    Phantom(Pose),
+    /// It is told of a road user that is not there, always at the same place.
+    Phantom(SensedObject),
     /// Its commands are carried out so long after, s.
     Delayed(f64),
     /// The brake acts this many times as strongly as it asks, as far as the vehicle can.
     Braking(f64),
     /// The wheels turn this much more to the left than it asks, rad.
     Steering(f64),
+    /// A program of the user's is told the truth, where its profile has it told what is perceived. Others are not changed.
+    Truth,
+    /// A program of the user's is obeyed at once, without the latency of its profile. Others are not changed.
+    Prompt,
 }
 
 impl Alteration {
@@ -108,27 +112,16 @@ impl Alteration {
                     };
                 }
             }
-            Alteration::Phantom(pose) => {
-                sensed.objects.push(SensedObject {
-                    id: PHANTOM_ID,
-                    body: Body::Sedan,
-                    pose,
-                    velocity_mps: Vec2::zeros(),
-                    length_m: 4.6,
-                    width_m: 1.9,
-                    height_m: 1.5,
-                    visible_fraction: 1.0,
-                    distance_m: 0.0,
-                    is_unlit: false,
-                    has_siren: false,
-                    lights: ShownLights::Off,
-                });
+            Alteration::Phantom(object) => {
+                sensed.objects.push(SensedObject { id: PHANTOM_ID, ..object });
                 measure(sensed);
             }
             Alteration::Late(_)
             | Alteration::Delayed(_)
             | Alteration::Braking(_)
-            | Alteration::Steering(_) => {}
+            | Alteration::Steering(_)
+            | Alteration::Truth
+            | Alteration::Prompt => {}
         }
     }
 
@@ -218,5 +211,25 @@ impl Ads for Altered {
 
     fn conversation(&self) -> Option<Conversation> {
         self.ads.conversation()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{object, sensed};
+    use avastra_lang::model::vocabulary::Body;
+
+    #[test]
+    fn what_is_mirrored_twice_is_as_it_was() {
+        let other = object(3, Body::Sedan, Pose::new(9.0, 4.0, 0.3), 7.0);
+        let sensed = sensed(Pose::new(1.0, 2.0, 0.5), 8.0, vec![other]);
+        let mut told = sensed.clone();
+        Alteration::Mirrored.tell(&mut told);
+        assert!((told.objects[0].pose.position - other.pose.position).norm() > 1.0);
+        Alteration::Mirrored.tell(&mut told);
+        let twice = told.objects[0];
+        assert!((twice.pose.position - other.pose.position).norm() < 1e-9);
+        assert!((twice.velocity_mps - other.velocity_mps).norm() < 1e-9);
     }
 }

@@ -136,7 +136,13 @@ impl Selected {
         let first: Box<dyn Ads> = match (&self.kind, &self.profile) {
             (_, Some(profile)) => Box::new(Modular::new(scene, profile, own_seed, self.foresight.clone())),
             (Kind::Ours(entry), None) => (entry.build)(scene, own_seed),
-            (Kind::External(program), None) => Box::new(External::new(program, scene, own_seed)),
+            (Kind::External(program), None) => {
+                let mut external = External::new(program, scene, own_seed);
+                for (alteration, from_s) in &self.alterations {
+                    external.mend(*alteration, *from_s);
+                }
+                Box::new(external)
+            }
         };
         let first = self
             .alterations

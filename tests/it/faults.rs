@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use avastra::ads::{ModularConfig, Module};
-use avastra::episode::EpisodeLog;
+use avastra::episode::{EpisodeLog, Script};
 use avastra::model::Space;
 use avastra::oracle;
-use avastra::oracle::{Diagnosis, Fate, Found, Verdict};
+use avastra::oracle::{Diagnosis, Fate, Found, Replayed, Verdict};
 use avastra::run::{Profile, Run};
 
 use crate::cases::root;
@@ -58,8 +58,8 @@ const fn planted(name: &'static str, space: &'static str, begin: usize) -> Plant
     Planted { name, space, begin, seed: 3 }
 }
 
-/// Number of small variations of a crash. At least half of them must crash too: a fault's crash is no accident.
-const VARIATIONS: u32 = 6;
+/// Number of replays of a crash with other noise. At least a third of them must crash too: a fault's crash is no accident.
+const REPLAYS: u32 = 6;
 
 /// Small changes in every module, so that the cause is not simply the one module that differs from the default.
 const DECOYS: &str = "tests/cases/faults/decoys.yaml";
@@ -158,7 +158,7 @@ fn made(name: &str) -> Arc<Space> {
 }
 
 /// The counted collision of an episode, if the fault makes it: with the default settings of the faulty module
-/// it vanishes, and small variations do not remove it.
+/// it vanishes, and other noise does not remove it.
 fn crash(run: &Run, number: usize, module: Module) -> Option<(usize, EpisodeLog, usize)> {
     let (summary, log) = run.judged(number);
     let index = summary.collisions.iter().find(|finding| finding.counted)?.number;
@@ -166,9 +166,14 @@ fn crash(run: &Run, number: usize, module: Module) -> Option<(usize, EpisodeLog,
     let planted = setup.ads.profile().expect("it has modules");
     let healthy = planted.with_module_of(module, &ModularConfig::default());
     let fate = oracle::fate(&setup, &log, Found::Collision(index), &healthy).expect("it has modules");
-    let likely =
-        || 2 * oracle::likelihood(&setup, &log, Found::Collision(index), VARIATIONS).crashes >= VARIATIONS;
-    (fate == Fate::Vanished && likely()).then_some((number, log, index))
+    let again = || {
+        Replayed::new(&setup, &Script::of_log(&log), &log).is_again_in(
+            Found::Collision(index),
+            REPLAYS / 3,
+            REPLAYS,
+        )
+    };
+    (fate == Fate::Vanished && again()).then_some((number, log, index))
 }
 
 /// A shipped fault.

@@ -10,7 +10,6 @@ mod hazard;
 mod kept;
 mod lawful;
 mod measured;
-mod mechanisms;
 mod moment;
 mod recurrence;
 mod severity;
@@ -18,7 +17,6 @@ mod shrink;
 mod swaps;
 #[cfg(test)]
 mod tests;
-mod variation;
 mod verify;
 
 pub use avoidable::{
@@ -32,13 +30,9 @@ pub use evidence::{
 };
 pub use kept::{Breached, breached};
 pub use measured::Measure;
-pub use mechanisms::{
-    MechanismShare, Mechanisms, Share, WithoutMechanism, mechanism_shares, mechanisms, placebo,
-};
 pub use moment::{Branched, NoReturn, no_return};
 pub use recurrence::{MIXED, REPLAYS, Recurrence, Replayed, can_replay, can_tell, mixed_text};
 pub use severity::{Harm, Severity, severity};
 pub use shrink::{Shrunk, Worth, shrink, spare_steps};
 pub use swaps::{Change, HangsOn, Response, Swap, Swaps, swaps};
-pub use variation::{Likelihood, likelihood};
 pub use verify::{ClaimResult, NoTries, Replays, verify};

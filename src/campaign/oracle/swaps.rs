@@ -15,10 +15,12 @@
 
 use crate::episode;
 use crate::episode::{EpisodeLog, Setup};
+use avastra_base::geometry::Vec2;
 use avastra_base::rng;
 use avastra_base::rng::Stream;
 use avastra_drivers::{Alteration, Selected};
-use avastra_world::sim::{DT_S, EgoMotion, Sensed, SignalColour, Start, VehicleParameters};
+use avastra_lang::model::vocabulary::{Body, ShownLights};
+use avastra_world::sim::{DT_S, EgoMotion, Sensed, SensedObject, SignalColour, Start, VehicleParameters};
 
 use super::case::{Case, Fate, Found, What};
 use super::cause::{AGAIN_MIN, again, unchanged};
@@ -30,6 +32,8 @@ const SEEN_S: f64 = 1.0;
 const SEEN_PART: f64 = 0.2;
 /// A first command that comes later than this is late, s. The careful drivers of UN R157 perceive a risk after 0.4 s.
 const LATE_S: f64 = 0.4;
+/// Who perceives and tracks others may take so much longer, s: `modular` first reacts after 0.4 to 0.5 s.
+const PERCEIVES_S: f64 = 0.3;
 /// Braking with less than this part of what is needed is weak.
 const WEAK: f64 = 0.75;
 /// The phantom stands where so much braking is needed, m/s².
@@ -40,10 +44,15 @@ const FAST_MPS: f64 = 5.0;
 const EFFECT_S: f64 = 4.0;
 /// Where it is shown, the ego vehicle must not brake more than this, m/s².
 const FREE_MPS2: f64 = 0.3;
-/// A driver whose mean place beside its route is farther off than this, m, and varies less than half of it, steers to one side.
-const BESIDE_M: f64 = 0.2;
-/// For so long before the hazard that is looked at, s.
-const BESIDE_S: f64 = 5.0;
+/// A driver whose median place beside its route is farther off than this, m, and whose quartiles are nearer together than that,
+/// steers to one side.
+const BESIDE_M: f64 = 0.15;
+/// That is looked at where it drove for so long, s, faster than so, m/s, and the route goes straight for so far, m.
+const BESIDE_S: f64 = 3.0;
+const BESIDE_MPS: f64 = 3.0;
+const STRAIGHT_M: f64 = 20.0;
+/// Lights are looked at from so long before the failure on, s.
+const LIGHTS_S: f64 = 15.0;
 /// What makes up for a delay that could not be measured, s.
 const AHEAD_S: f64 = 0.5;
 
@@ -58,9 +67,9 @@ pub struct Swaps {
     pub swaps: Vec<Swap>,
     /// `None` if the way was nowhere free.
     pub response: Option<Response>,
-    /// Its steady place to the left of its route before the hazard, m; 0 if it was not steady.
+    /// Its steady place to the left of its route where that is straight, m; 0 if it was not steady.
     pub beside_m: f64,
-    /// Whether it passed a red light in the time that is looked at.
+    /// Whether it passed a light that was not green in the time that is looked at.
     pub passed_red: bool,
     /// Replays with other noise and nothing changed; `None` if none were needed.
     pub chance: Option<Chance>,
@@ -100,29 +109,42 @@ pub enum Change {
     Braking(f64),
     /// The wheels are turned this much more to the left, rad.
     Steering(f64),
+    /// It is told what is so, in place of what is perceived.
+    Truth,
+    /// It is obeyed at once, in place of after the latency of its profile.
+    Prompt,
 }
 
-/// What a driving system did about a car that was not there.
+/// What a driving system did about road users that were not there, in its way.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Response {
-    /// When it was shown, s.
+    /// When they were shown, each in a drive of its own, s.
     pub shown_s: f64,
-    /// Until the drive changed, s; `None` if it never did.
+    /// Until the drive changed because of a standing car, s; `None` if it never did.
     pub late_s: Option<f64>,
-    /// The hardest braking after that, as a part of what was needed; `None` if it drove around it.
+    /// The hardest braking after that, as a part of what was needed; `None` if it drove around the car.
     pub braking: Option<f64>,
+    /// Whether the drive changed because of one like the road user that the failure is about; `None` if it is about none.
+    pub minds_its_like: Option<bool>,
+    /// Whether it drove otherwise for a car that is as fast as itself than for a standing one; `None` if it is told no speeds, but
+    /// sees places.
+    pub minds_speed: Option<bool>,
 }
 
 /// The cause of a failure, as far as it shows from outside.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum HangsOn {
-    /// It passed a red light, and drives the same if all lights are red.
+    /// It passed a light that was not green, and drives the same whatever lights show.
     IgnoredLights,
     /// It drives the same without the road user.
     IgnoredRoadUser,
     /// It drives the same if it is told that others stand.
     IgnoredSpeeds,
+    /// Told what is so, in place of what is perceived, it does not fail.
+    Perception,
+    /// Obeyed at once, in place of after the latency of its profile, it does not fail.
+    Latency,
     /// Its commands come late, and told of things so long before, it does not fail.
     Delay,
     /// It brakes weakly, and with stronger brakes it does not fail.
@@ -142,6 +164,8 @@ impl HangsOn {
             HangsOn::IgnoredLights => "ignored lights",
             HangsOn::IgnoredRoadUser => "ignored road user",
             HangsOn::IgnoredSpeeds => "ignored speeds",
+            HangsOn::Perception => "perception",
+            HangsOn::Latency => "latency",
             HangsOn::Delay => "delay",
             HangsOn::Brakes => "brakes",
             HangsOn::Steering => "steering",
@@ -165,7 +189,14 @@ impl Change {
             Change::Mirrored => Alteration::Mirrored,
             Change::Braking(by) => Alteration::Braking(by),
             Change::Steering(by_rad) => Alteration::Steering(by_rad),
+            Change::Truth => Alteration::Truth,
+            Change::Prompt => Alteration::Prompt,
         }
+    }
+
+    /// Whether something else is told, and not only its commands are carried out otherwise.
+    pub fn is_told(self) -> bool {
+        !matches!(self, Change::Braking(_) | Change::Steering(_) | Change::Truth | Change::Prompt)
     }
 
     /// In words: what holds from a moment on.
@@ -182,6 +213,8 @@ impl Change {
             Change::Mirrored => "left and right are exchanged".to_owned(),
             Change::Braking(by) => format!("its brake acts {by:.1} times as strongly"),
             Change::Steering(by_rad) => format!("its wheels are turned by {by_rad:+.3} rad"),
+            Change::Truth => "it is told the truth".to_owned(),
+            Change::Prompt => "it is obeyed at once".to_owned(),
         }
     }
 }
@@ -208,8 +241,32 @@ impl Swaps {
         self.swaps.iter().any(|swap| is_meant(swap.change) && is_told_apart(swap.noise))
     }
 
+    /// Whether it drives the same whatever the lights show.
+    fn minds_no_light(&self) -> bool {
+        let is_ignored =
+            |colour| self.swap(|change| change == colour).is_some_and(|swap| swap.differs_s.is_none());
+        is_ignored(Change::Red) && is_ignored(Change::Green)
+    }
+
+    /// Whether it drives the same without the road user, and did not mind one like it in its way.
+    fn minds_none_like_it(&self) -> bool {
+        let minds = self.response.and_then(|response| response.minds_its_like);
+        minds == Some(false) && self.is_ignored(|change| matches!(change, Change::Without(_)))
+    }
+
+    /// Whether it drives the same if others stand, and did not mind the speed of a car in its way.
+    fn minds_no_speed(&self) -> bool {
+        let ignores = |response: Response| response.late_s.is_some() && response.minds_speed == Some(false);
+        self.response.is_some_and(ignores) && self.is_ignored(|change| change == Change::Standing)
+    }
+
     fn is_late(&self) -> bool {
-        self.response.and_then(|response| response.late_s).is_some_and(|late_s| late_s > LATE_S)
+        let told_speeds = |response: Response| response.minds_speed.is_some();
+        let late_s = |response: Response| {
+            let allowed_s = if told_speeds(response) { LATE_S } else { LATE_S + PERCEIVES_S };
+            response.late_s.filter(|late_s| *late_s > allowed_s)
+        };
+        self.response.and_then(late_s).is_some()
     }
 
     fn is_weak(&self) -> bool {
@@ -220,15 +277,22 @@ impl Swaps {
     fn conclude(&self) -> Option<HangsOn> {
         let is_side = |change| change == Change::Mirrored;
         let is_room = |change| matches!(change, Change::Nearer | Change::Larger);
+        // A reaction that was not measured may be late or weak.
+        let is_sound =
+            self.response.is_some_and(|response| response.late_s.is_some() && response.braking.is_some())
+                && !self.is_late()
+                && !self.is_weak();
         let rules = [
-            (self.passed_red && self.is_ignored(|change| change == Change::Red), HangsOn::IgnoredLights),
+            (self.minds_none_like_it(), HangsOn::IgnoredRoadUser),
+            (self.passed_red && self.minds_no_light(), HangsOn::IgnoredLights),
             (self.prevents(|change| matches!(change, Change::Steering(_))), HangsOn::Steering),
-            (self.is_ignored(|change| matches!(change, Change::Without(_))), HangsOn::IgnoredRoadUser),
-            (self.is_ignored(|change| change == Change::Standing), HangsOn::IgnoredSpeeds),
+            (self.minds_no_speed(), HangsOn::IgnoredSpeeds),
+            (self.prevents(|change| change == Change::Prompt), HangsOn::Latency),
+            (self.prevents(|change| change == Change::Truth), HangsOn::Perception),
             (self.is_late() && self.prevents(|change| matches!(change, Change::Ahead(_))), HangsOn::Delay),
             (self.is_weak() && self.prevents(|change| matches!(change, Change::Braking(_))), HangsOn::Brakes),
-            (self.prevents(is_side) && !self.prevents(is_room), HangsOn::Sides),
-            (self.prevents(is_room) && !self.prevents(is_side), HangsOn::Room),
+            (is_sound && self.prevents(is_side) && !self.prevents(is_room), HangsOn::Sides),
+            (is_sound && self.prevents(is_room) && !self.prevents(is_side), HangsOn::Room),
         ];
         rules.into_iter().find_map(|(holds, hangs_on)| holds.then_some(hangs_on))
     }
@@ -279,6 +343,8 @@ impl<'a> Asked<'a> {
                     | Change::Mirrored
                     | Change::Braking(_)
                     | Change::Steering(_)
+                    | Change::Truth
+                    | Change::Prompt
             );
             is_asked && swap.fate == Fate::Vanished
         };
@@ -302,18 +368,29 @@ impl<'a> Asked<'a> {
         Swaps { hangs_on: found.conclude(), ..found }
     }
 
-    /// What is changed, one after the other.
-    fn changes(&self, response: Option<Response>, beside_m: f64) -> Vec<Change> {
-        let about = match self.case.what {
+    /// The number of the road user that the failure is about.
+    fn about(&self) -> Option<u32> {
+        match self.case.what {
             What::Collision { collision, .. } => Some(collision.contact.obstacle),
             What::Breach(breach) => breach.obstacle,
-        };
+        }
+    }
+
+    /// Whether it is told how fast others are. What perceives and tracks others works that out from their places.
+    fn is_told_speeds(&self) -> bool {
+        let ads = &self.case.setup.ads;
+        ads.profile().is_none() && ads.program().is_none_or(|program| !program.settings().shows_perceived())
+    }
+
+    /// What is changed, one after the other.
+    fn changes(&self, response: Option<Response>, beside_m: f64) -> Vec<Change> {
         let late_s = response.and_then(|response| response.late_s).unwrap_or(AHEAD_S);
         let ahead_s = (late_s.max(0.2) / DT_S).round() * DT_S;
         let weak =
             response.and_then(|response| response.braking).map_or(2.0, |part| (1.0 / part).clamp(1.5, 4.0));
-        let mut changes: Vec<Change> = about.map(Change::Without).into_iter().collect();
-        changes.extend([Change::WithoutAll, Change::Standing]);
+        let mut changes: Vec<Change> = self.about().map(Change::Without).into_iter().collect();
+        changes.push(Change::WithoutAll);
+        changes.extend(self.is_told_speeds().then_some(Change::Standing));
         if self.ticks.first().is_some_and(|tick| !tick.sensed.signals.is_empty()) {
             changes.extend([Change::Red, Change::Green]);
         }
@@ -324,6 +401,11 @@ impl<'a> Asked<'a> {
             Change::Mirrored,
             Change::Braking(weak),
         ]);
+        if let Some(program) = self.case.setup.ads.program() {
+            let (_, latency) = program.settings().ticks();
+            changes.extend(program.settings().shows_perceived().then_some(Change::Truth));
+            changes.extend((latency > 0).then_some(Change::Prompt));
+        }
         if beside_m != 0.0 {
             changes.extend([0.01, 0.02, 0.04].map(|by_rad| Change::Steering(-by_rad * beside_m.signum())));
         }
@@ -331,9 +413,17 @@ impl<'a> Asked<'a> {
     }
 
     fn swap(&self, change: Change) -> Swap {
-        let (log, motions) = self.play(self.changed(change.alteration(), self.from_s), None);
+        let (log, motions) = self.play(self.changed(change.alteration(), self.begins_s(change)), None);
         let differs_s = self.differs_s(&motions).filter(|differs_s| *differs_s < self.found_s);
         Swap { change, fate: self.case.fate(&log), told_s: self.told_s(change), differs_s, noise: None }
+    }
+
+    /// From when on a thing is changed, s: a light may have been passed before its obstacle appeared.
+    fn begins_s(&self, change: Change) -> f64 {
+        match change {
+            Change::Red | Change::Green => self.from_s.min((self.found_s - LIGHTS_S).max(0.0)),
+            _ => self.from_s,
+        }
     }
 
     fn changed(&self, alteration: Alteration, from_s: f64) -> Selected {
@@ -390,7 +480,7 @@ impl<'a> Asked<'a> {
             alteration.tell(&mut told);
             told != seen
         };
-        let is_within = |tick: &&Tick| tick.sensed.time_s >= self.from_s - 1e-6;
+        let is_within = |tick: &&Tick| tick.sensed.time_s >= self.begins_s(change) - 1e-6;
         self.ticks.iter().filter(is_within).find(tells).map(|tick| tick.sensed.time_s)
     }
 
@@ -402,7 +492,7 @@ impl<'a> Asked<'a> {
         let free = self.ticks.iter().position(|tick| {
             let ego = &tick.sensed.ego;
             let look_m = 2.0 * away_m(ego.speed_mps) + 15.0;
-            let is_before = |at: avastra_base::geometry::Vec2| {
+            let is_before = |at: Vec2| {
                 let local = ego.rear_axle.to_local(at);
                 local.x > 0.0 && local.x < look_m && local.y.abs() < 6.0
             };
@@ -419,11 +509,37 @@ impl<'a> Asked<'a> {
         let tick = &self.ticks[free];
         let shown_s = tick.sensed.time_s;
         let station_m = tick.station_m + car.rear_axle_to_front_m + away_m(tick.sensed.ego.speed_mps) + 2.3;
-        let phantom = Alteration::Phantom(route.path.pose_at(station_m));
-        let (_, motions) = self.play(self.changed(phantom, shown_s), None);
-        let Some(differs_s) = self.differs_s(&motions) else {
-            return Some(Response { shown_s, late_s: None, braking: None });
+        let car_there = SensedObject {
+            id: 0,
+            body: Body::Sedan,
+            pose: route.path.pose_at(station_m),
+            velocity_mps: Vec2::zeros(),
+            length_m: 4.6,
+            width_m: 1.9,
+            height_m: 1.5,
+            visible_fraction: 1.0,
+            distance_m: 0.0,
+            is_unlit: false,
+            has_siren: false,
+            lights: ShownLights::Off,
         };
+        let shown = |object| self.play(self.changed(Alteration::Phantom(object), shown_s), None).1;
+        let motions = shown(car_there);
+        // Nearer, some drivers brake as hard as they can for either.
+        let farther_m = station_m + away_m(tick.sensed.ego.speed_mps);
+        let farther = SensedObject { pose: route.path.pose_at(farther_m), ..car_there };
+        let velocity_mps = farther.pose.forward() * tick.sensed.ego.speed_mps;
+        let minds_speed =
+            self.is_told_speeds().then(|| shown(SensedObject { velocity_mps, ..farther }) != shown(farther));
+        let minds_its_like = self.about().and_then(|id| {
+            let its_like =
+                self.ticks.iter().flat_map(|tick| &tick.sensed.objects).find(|object| object.id == id)?;
+            let SensedObject { pose, velocity_mps, visible_fraction, .. } = car_there;
+            let there = SensedObject { pose, velocity_mps, visible_fraction, ..*its_like };
+            Some(self.differs_s(&shown(there)).is_some())
+        });
+        let none = Response { shown_s, late_s: None, braking: None, minds_its_like, minds_speed };
+        let Some(differs_s) = self.differs_s(&motions) else { return Some(none) };
         // A command acts in the tick after it.
         let late_s = (differs_s - shown_s - DT_S).max(0.0);
         let after = motions.iter().skip(free).take((EFFECT_S / DT_S) as usize);
@@ -434,41 +550,41 @@ impl<'a> Asked<'a> {
         });
         let needed_mps2 = NEEDED_MPS2.min(8.5 * tick.sensed.conditions.friction);
         let braking = (!goes_around).then_some(hardest_mps2 / needed_mps2);
-        Some(Response { shown_s, late_s: Some(late_s), braking })
+        Some(Response { late_s: Some(late_s), braking, ..none })
     }
 
-    /// Its steady place to the left of its route before the hazard, m; 0 if it was not steady.
+    /// Its steady place to the left of its route where that is straight, m; 0 if it was not steady.
     fn beside_m(&self) -> f64 {
-        let until_s = self.from_s.max(BESIDE_S);
-        let is_in = |tick: &&Tick| {
-            let ego = &tick.sensed.ego;
-            (until_s - BESIDE_S..until_s.min(self.found_s)).contains(&ego_time(tick)) && ego.speed_mps > 2.0
+        let path = &self.case.setup.scene.route.path;
+        let is_straight = |tick: &&Tick| {
+            let station_m = tick.station_m;
+            tick.sensed.time_s < self.found_s
+                && tick.sensed.ego.speed_mps > BESIDE_MPS
+                && path.turned_rad(station_m, (station_m + STRAIGHT_M).min(path.length_m())).abs() < 0.02
         };
-        let places: Vec<f64> = self.ticks.iter().filter(is_in).map(|tick| tick.beside_m).collect();
-        if places.len() < (1.0 / DT_S) as usize {
+        let mut places: Vec<f64> = self.ticks.iter().filter(is_straight).map(|tick| tick.beside_m).collect();
+        if places.len() < (BESIDE_S / DT_S) as usize {
             return 0.0;
         }
-        let mean = places.iter().sum::<f64>() / places.len() as f64;
-        let varies = places.iter().map(|place| (place - mean).abs()).fold(0.0, f64::max);
-        if mean.abs() > BESIDE_M && varies < mean.abs() / 2.0 { mean } else { 0.0 }
+        places.sort_by(f64::total_cmp);
+        let part = |of: f64| places[(of * (places.len() - 1) as f64) as usize];
+        let (low, middle, high) = (part(0.25), part(0.5), part(0.75));
+        if middle.abs() > BESIDE_M && high - low < middle.abs() { middle } else { 0.0 }
     }
 
-    /// Whether its front passed a line of the route while the light showed red, in the time that is looked at.
+    /// Whether its front passed a line of the route while the light was not green, in the time that is looked at.
     fn passed_red(&self) -> bool {
         let front_m = VehicleParameters::MKZ.rear_axle_to_front_m;
-        let is_within = |tick: &Tick| tick.sensed.time_s >= self.from_s && tick.sensed.time_s <= self.found_s;
+        let from_s = self.begins_s(Change::Red);
+        let is_within = |tick: &Tick| (from_s..=self.found_s).contains(&tick.sensed.time_s);
         self.case.setup.scene.route.stop_lines.iter().any(|line| {
             self.ticks.windows(2).any(|pair| {
                 let is_over = |tick: &Tick| tick.station_m + front_m > line.station_m;
                 is_within(&pair[1])
                     && !is_over(&pair[0])
                     && is_over(&pair[1])
-                    && pair[1].sensed.signals[line.signal] == SignalColour::Red
+                    && pair[1].sensed.signals[line.signal] != SignalColour::Green
             })
         })
     }
-}
-
-fn ego_time(tick: &Tick) -> f64 {
-    tick.sensed.time_s
 }

@@ -19,7 +19,7 @@ pub use learn::{
     StudyArguments, StudyCommand, TrainArguments, WeightsArguments,
 };
 pub use scenarios::{
-    CountedBy, DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportProfile, FilesArguments,
+    DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportProfile, FilesArguments,
     ImportArguments, RenderArguments, ReplayArguments, ReportArguments, RoadArguments, ShrinkArguments,
     TestArguments,
 };

@@ -47,31 +47,17 @@ pub struct DiagnoseArguments {
     #[command(flatten)]
     pub against: AgainstArguments,
     /// Profile that says how good each module should be [default: `modular` as it comes].
-    #[arg(long, value_name = "FILE", conflicts_with = "mechanisms")]
+    #[arg(long, value_name = "FILE")]
     pub baseline: Option<PathBuf>,
-    /// Say also how many of N small variations of timing, speeds and sensor errors still crash.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with = "mechanisms")]
-    pub likelihood: Option<u32>,
-    /// Instead of modules, the documented weaknesses: the share of the collisions of all files
-    /// that vanish when one alone is switched off as the obstacle appears, beside the share that other sensor noise
-    /// alone makes vanish.
-    #[arg(long)]
-    pub mechanisms: bool,
-    /// Instead of modules, the moment of no return, of any driving system. It says how likely the finding was at each moment before
+    /// Look at `modular` as at any other driving system: change what it is told and what becomes of its commands, not its modules.
+    #[arg(long, conflicts_with = "baseline")]
+    pub outside: bool,
+    /// Instead of causes, the moment of no return. It says how likely the finding was at each moment before
     /// it, and until when a careful driver could have avoided it. At each moment, branches begin under other noise.
-    #[arg(long, conflicts_with_all = ["mechanisms", "likelihood", "baseline"])]
+    #[arg(long, conflicts_with_all = ["outside", "baseline"])]
     pub moment: bool,
-    /// What several findings are counted by: the modules at fault, or the smallest change that removes each.
-    #[arg(long, value_enum, value_name = "WHAT", default_value_t = CountedBy::Cause, conflicts_with = "mechanisms")]
-    pub by: CountedBy,
     #[command(flatten)]
     pub many: FilesArguments,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum CountedBy {
-    Cause,
-    Cure,
 }
 
 #[derive(Debug, Args)]

@@ -7,6 +7,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
+use crate::altered::Alteration;
 use crate::driver::Ads;
 use crate::modular::{Modular, ModularConfig};
 use crate::status::{PerceivedObject, Reason, Status};
@@ -16,7 +17,7 @@ use avastra_world::sim::{Control, DT_S, Scene, Sensed};
 
 use super::finding::{Failure, FailureKind, Problem};
 use super::follow::Follower;
-use super::message::{Answer, Event, Observation, Question};
+use super::message::{Answer, Event, Question};
 use super::program::{MapLine, Program};
 use super::question;
 use super::record::{Conversation, Key, Outcome, Told, Transcript};
@@ -25,6 +26,9 @@ use super::settings::OnTimeout;
 
 /// After this simulated time without an answer the vehicle brakes, s: Apollo's 20 planning cycles.
 const LOST_S: f64 = 2.0;
+
+/// Numbers of objects that no track follows begin here, where the truth is shown in place of what is perceived.
+const UNTRACKED_ID_MIN: u64 = 1 << 32;
 
 /// An external driving system in one episode.
 #[derive(Clone)]
@@ -35,6 +39,9 @@ pub struct External {
     map: Arc<MapLine>,
     /// The modular system whose perception the program is shown; `None` if it is shown the truth.
     observer: Option<Box<Modular>>,
+    /// From when on it is told the truth all the same, and obeyed at once, s.
+    truth_from_s: f64,
+    prompt_from_s: f64,
     follower: Follower,
     /// The questions so far, the `reset` first, each with its outcome.
     exchanges: Vec<Exchange>,
@@ -84,7 +91,9 @@ impl External {
             scene: Arc::clone(scene),
             seed,
             map: program.map_line(&scene.map),
-            observer: (program.settings().observation == Observation::Perceived).then(observer),
+            observer: program.settings().shows_perceived().then(observer),
+            truth_from_s: f64::INFINITY,
+            prompt_from_s: f64::INFINITY,
             follower: Follower::new(scene),
             exchanges: Vec::new(),
             live: Live::default(),
@@ -96,6 +105,20 @@ impl External {
             failure: None,
             status: Status::default(),
         }
+    }
+
+    /// Takes over from a moment on, s, the changes that are within: the truth, and no latency.
+    pub fn mend(&mut self, alteration: Alteration, from_s: f64) {
+        match alteration {
+            Alteration::Truth => self.truth_from_s = from_s,
+            Alteration::Prompt => self.prompt_from_s = from_s,
+            _ => {}
+        }
+    }
+
+    /// Who perceives what is shown now; `None` if the truth is shown.
+    fn perceives(&self, time_s: f64) -> Option<&Modular> {
+        self.observer.as_deref().filter(|_| time_s < self.truth_from_s - 1e-6)
     }
 
     /// Asks what to do, at this tick.
@@ -111,7 +134,18 @@ impl External {
             }
         }
         let (seq, t_us) = (self.exchanges.len() as u64 - 1, question::micros(tick as f64 * DT_S));
-        let step = question::step(&self.scene, sensed, self.observer.as_deref(), (seq, t_us), route_m);
+        let perceives = self.perceives(sensed.time_s);
+        let mut step = question::step(&self.scene, sensed, perceives, (seq, t_us), route_m);
+        if perceives.is_none()
+            && let Some(observer) = &self.observer
+        {
+            // Who was perceived keeps the number of the track.
+            for object in &mut step.objects {
+                let mut known = observer.status().perceived.iter();
+                let known = known.find(|known| known.id.map(u64::from) == Some(object.id));
+                object.id = known.map_or(UNTRACKED_ID_MIN + object.id, |known| known.track.into());
+            }
+        }
         let mut lines = String::new();
         if sensed.ego.touched && !self.touched {
             lines = Question::Event(Event { kind: "collision".to_owned(), t_us }).line();
@@ -126,7 +160,12 @@ impl External {
         };
         if let Some(Outcome::Answer(answer)) = self.exchange(lines.into(), before, Some((seq, t_us)), tracks)
         {
-            let (_, latency) = self.program.settings().ticks();
+            let (_, mut latency) = self.program.settings().ticks();
+            if sensed.time_s >= self.prompt_from_s - 1e-6 {
+                // What was still to come is overtaken.
+                self.coming.clear();
+                latency = 0;
+            }
             self.coming.push_back((tick + latency, answer));
             self.answered_tick = tick;
         }
@@ -308,7 +347,7 @@ impl Ads for External {
         if let Some(observer) = &mut self.observer {
             observer.drive(sensed);
         }
-        let pose = question::pose(sensed, self.observer.as_deref());
+        let pose = question::pose(sensed, self.perceives(sensed.time_s));
         let route_m = self.follower.locate(&pose);
         let tick = (sensed.time_s / DT_S).round() as u64;
         let (period, _) = self.program.settings().ticks();

@@ -280,6 +280,11 @@ impl ExternalSettings {
         Ok(self)
     }
 
+    /// Whether it is told what is perceived, and not the truth.
+    pub fn shows_perceived(&self) -> bool {
+        self.observation == Observation::Perceived
+    }
+
     /// Ticks between two steps, and until an answer is obeyed.
     pub fn ticks(&self) -> (u64, u64) {
         ((self.period_s / DT_S).round() as u64, (self.latency_s / DT_S).round() as u64)

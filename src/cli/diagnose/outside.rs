@@ -1,0 +1,168 @@
+//! What `diagnose` says of a driving system of any kind: what the finding hangs on, as it shows from outside.
+
+use avastra_campaign::oracle::{HangsOn, Response, Swap, Swaps};
+
+use super::modules::noise_text;
+
+/// All about one finding.
+pub fn whole_text(swaps: &Swaps) -> String {
+    let [table, response, beside] = [table_text(swaps), response_text(swaps), beside_text(swaps)];
+    format!("{table}{response}{beside}\n\n{}", sentence(swaps))
+}
+
+/// What it hangs on, in a word or two.
+pub fn cause(swaps: &Swaps) -> String {
+    swaps.hangs_on.map_or("none", HangsOn::name).to_owned()
+}
+
+fn table_text(swaps: &Swaps) -> String {
+    let Swaps { noun, from_s, .. } = swaps;
+    let head = format!("from {from_s:.1} s on");
+    let mut text =
+        format!("\n{head:<46}{:<20}{:<24}{}", "what becomes of it", "the drive", "with other noise");
+    for swap in &swaps.swaps {
+        let (change, fate) = (swap.change.in_words(), swap.fate.in_words(noun));
+        let noise = swap.noise.map_or(String::new(), noise_text);
+        let line = format!("{change:<46}{fate:<20}{:<24}{noise}", drive_text(swap));
+        text.push_str(&format!("\n{}", line.trim_end()));
+    }
+    if let Some(chance) = swaps.chance {
+        let count = format!("no {noun} in {} of {}", chance.vanished, chance.replays);
+        text.push_str(&format!("\n{:<90}{count}", "nothing changed (chance)"));
+    }
+    text
+}
+
+/// What a change did to the drive.
+fn drive_text(swap: &Swap) -> String {
+    match (swap.differs_s, swap.told_s) {
+        (Some(differs_s), _) => format!("differs from {differs_s:.2} s"),
+        (None, None) if swap.change.is_told() => "nothing was changed".to_owned(),
+        (None, _) => "is the same".to_owned(),
+    }
+}
+
+fn response_text(swaps: &Swaps) -> String {
+    let Some(Response { shown_s, late_s, braking, minds_its_like, minds_speed }) = swaps.response else {
+        return "\n\nIts way was never free, so its reactions were not measured.".to_owned();
+    };
+    let mut text = format!("\n\nIt was told at {shown_s:.1} s of a car in its way that was not there:");
+    match late_s {
+        None => text.push_str("\n- It did nothing about it."),
+        Some(late_s) => text.push_str(&format!("\n- Its first other command came after {late_s:.2} s.")),
+    }
+    match braking {
+        Some(part) if late_s.is_some() => {
+            text.push_str(&format!("\n- It braked with {:.0} % of what was needed.", 100.0 * part));
+        }
+        _ if late_s.is_some() => text.push_str("\n- It drove around it."),
+        _ => {}
+    }
+    if minds_its_like == Some(false) {
+        text.push_str("\n- It did nothing about a road user like the one that this is about.");
+    }
+    if late_s.is_some() && minds_speed == Some(false) {
+        text.push_str("\n- It did the same if the car was as fast as itself.");
+    }
+    text
+}
+
+/// Where it drives on straight roads, if that is beside its route.
+fn beside_text(swaps: &Swaps) -> String {
+    if swaps.beside_m == 0.0 {
+        return String::new();
+    }
+    let side = if swaps.beside_m > 0.0 { "left" } else { "right" };
+    format!("\n\nOn straight roads it drives {:.2} m to the {side} of its route.", swaps.beside_m.abs())
+}
+
+/// The verdict in a sentence that follows from the evidence alone.
+pub fn sentence(swaps: &Swaps) -> String {
+    let noun = swaps.noun;
+    let late_s = swaps.response.and_then(|response| response.late_s).unwrap_or_default();
+    let braking = swaps.response.and_then(|response| response.braking).unwrap_or_default();
+    match swaps.hangs_on {
+        Some(HangsOn::IgnoredLights) => {
+            format!(
+                "the {noun} hangs on ignored lights: it passed one that was not green, and drives the same whatever lights show"
+            )
+        }
+        Some(HangsOn::IgnoredRoadUser) => {
+            format!(
+                "the {noun} hangs on an ignored road user: it drives the same if it is not told of it, and does nothing about one like it in its way"
+            )
+        }
+        Some(HangsOn::IgnoredSpeeds) => {
+            format!("the {noun} hangs on ignored speeds: it drives the same if it is told that others stand")
+        }
+        Some(HangsOn::Delay) => {
+            format!(
+                "the {noun} hangs on a delay: it reacts after {late_s:.2} s, and told of things so long before, there is no {noun}"
+            )
+        }
+        Some(HangsOn::Latency) => {
+            format!("the {noun} hangs on the latency of the profile: obeyed at once, there is no {noun}")
+        }
+        Some(HangsOn::Perception) => {
+            format!("the {noun} hangs on what is perceived: told the truth, there is no {noun}")
+        }
+        Some(HangsOn::Brakes) => {
+            format!(
+                "the {noun} hangs on the brakes: it brakes with {:.0} % of what is needed, and with stronger brakes there is no {noun}",
+                100.0 * braking
+            )
+        }
+        Some(HangsOn::Steering) => {
+            format!(
+                "the {noun} hangs on the steering: it drives beside its route, and turned back there is no {noun}"
+            )
+        }
+        Some(HangsOn::Sides) => {
+            format!("the {noun} hangs on left and right: with both exchanged there is no {noun}")
+        }
+        Some(HangsOn::Room) => {
+            format!(
+                "the {noun} hangs on how much room it keeps: told of others nearer or larger, there is no {noun}"
+            )
+        }
+        None => format!("nothing is named that the {noun} hangs on"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use avastra_campaign::oracle::{Change, Fate};
+
+    #[test]
+    fn a_table_says_what_was_not_used() {
+        let swap =
+            |change, told_s, differs_s| Swap { change, fate: Fate::Same, told_s, differs_s, noise: None };
+        let swaps = Swaps {
+            noun: "breach",
+            found_s: 9.0,
+            from_s: 2.0,
+            swaps: vec![
+                swap(Change::Red, Some(2.0), None),
+                swap(Change::WithoutAll, None, None),
+                swap(Change::Braking(2.0), None, Some(4.0)),
+            ],
+            response: None,
+            beside_m: -0.3,
+            passed_red: true,
+            chance: None,
+            hangs_on: Some(HangsOn::IgnoredLights),
+        };
+        let text = whole_text(&swaps);
+        for wanted in [
+            "it is told that lights are red                breach              is the same",
+            "it is told of nobody                          breach              nothing was changed",
+            "its brake acts 2.0 times as strongly          breach              differs from 4.00 s",
+            "were not measured",
+            "0.30 m to the right of its route",
+            "the breach hangs on ignored lights",
+        ] {
+            assert!(text.contains(wanted), "{wanted}: {text}");
+        }
+    }
+}
