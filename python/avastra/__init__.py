@@ -30,12 +30,13 @@ from .messages import (Acceleration, Answer, Conditions, Control, Crosswalk, Ego
                        Map, Object, Pedals, ProtocolError, Reset, Route, RoutePoint, Signal, Start, Step, Trajectory,
                        TrajectoryPoint, Vehicle)
 from .path import Beside, Path, Pose, wrap
-from .serve import serve
+from .serve import Listener, listen, serve
 from .way import Way
 
 if TYPE_CHECKING:
     # Under their own names: for a type checker this is what makes them names of this package.
     from .engine import ENGINE as ENGINE
+    from .engine import Draw as Draw
     from .engine import EpisodeError as EpisodeError
     from .engine import Episodes as Episodes
     from .engine import Snapshot as Snapshot
@@ -55,15 +56,15 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _ENGINE = [
-    "ENGINE", "EpisodeError", "Episodes", "Snapshot", "Space", "SpaceError", "Variable", "compile", "episode_seed",
+    "ENGINE", "Draw", "EpisodeError", "Episodes", "Snapshot", "Space", "SpaceError", "Variable", "compile", "episode_seed",
     "read_run", "recurs", "step_all", "variables",
 ]
 _NOTEBOOK = ["Run", "Scenario", "runs"]
 
 __all__ = [
     "Acceleration", "Answer", "Beside", "Conditions", "Control", "Crosswalk", "Driver", "Ego", "Event", "Goal", "Init",
-    "Internal", "Lane", "Map", "Object", "Path", "Pedals", "Pose", "ProtocolError", "Reset", "Route", "RoutePoint",
-    "Signal", "Start", "Step", "Trajectory", "TrajectoryPoint", "Vehicle", "Way", "serve", "wrap",
+    "Internal", "Lane", "Listener", "Map", "Object", "Path", "Pedals", "Pose", "ProtocolError", "Reset", "Route", "RoutePoint",
+    "Signal", "Start", "Step", "Trajectory", "TrajectoryPoint", "Vehicle", "Way", "listen", "serve", "wrap",
 ]
 
 

@@ -1,7 +1,7 @@
 """The engine of avastra, built from `python/native` by maturin. Use its names from `avastra`."""
 
 import os
-from typing import Dict, List, Literal, Optional, Sequence, Tuple, TypedDict, Union
+from typing import Dict, List, Literal, Mapping, Optional, Sequence, Tuple, TypedDict, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,84 @@ class Space:
     #: Warnings and remarks.
     diagnostics: List[Diagnostic]
 
+    @staticmethod
+    def from_text(text: str, path: _Path = "space.ava") -> Space:
+        """The space in a text, as if it were the file at `path`, from where `use` finds other files. Nothing is written there.
+
+        Raises `SpaceError` as `Space` does.
+        """
+
+    def draws(self, row: int, road: Optional[str] = None) -> List[Draw]:
+        """What a row draws on a road (without one, on the first), and within which bounds by the rules that are always in force.
+        Rules that ask about the moment may narrow them further. Empty if the row is masked there, or draws nothing.
+
+        Raises `IndexError` if there is no such row, `ValueError` if there is no such road.
+        """
+
+class Draw:
+    """A value that a row draws."""
+
+    name: str
+    #: SI; empty without a dimension and for a choice.
+    unit: str
+    #: Ends of a number's range, SI; `None` for a choice, and where no rule bounds it.
+    low: Optional[float]
+    high: Optional[float]
+    #: The values of a choice.
+    values: List[str]
+
+#: A value of a draw: a number in SI, a truth value, or the word of a choice.
+Drawn = Union[float, bool, str]
+
+#: A step of `Episodes.evaluate`: a row, a row and values for some of what it draws, or `None`.
+Chosen = Union[int, Tuple[int, Mapping[str, Drawn]], None]
+
+class Measures(TypedDict):
+    """How near the ego vehicle came to others. Those that it had touched before do not count."""
+
+    #: Least distance between the outlines, m; `None` if nobody was there.
+    distance_m: Optional[float]
+    #: Least time to collision, s; `None` if none was expected within 8 s.
+    ttc_s: Optional[float]
+    #: Least time headway, s.
+    thw_s: Optional[float]
+    #: Greatest deceleration rate to avoid a crash, m/s².
+    drac_mps2: float
+    #: Greatest deceleration that would stop the ego vehicle before an expected contact, m/s².
+    required_mps2: float
+    #: Time in which both distances to a road user were unsafe by RSS, s.
+    rss_unsafe_s: float
+
+class Breach(TypedDict):
+    """A requirement that was not kept."""
+
+    requirement: str
+    #: When it became a breach, s.
+    time_s: float
+    until_s: float
+    #: Its smallest margin, SI; `None` for a requirement without one.
+    margin: Optional[float]
+    #: The number of the road user that it is about.
+    npc: Optional[int]
+
+class Carried(TypedDict):
+    """What was carried out in a step."""
+
+    #: -1 without one.
+    row: int
+    #: Why the chosen row was not carried out; `None` if it was.
+    refused: Optional[str]
+    #: What the row drew, by name: numbers in SI, words of choices.
+    values: Dict[str, Drawn]
+
+class Trajectories(TypedDict):
+    """Where everybody was, every 0.1 s. The columns are time (s), x (m), y (m), heading (rad) and speed (m/s)."""
+
+    #: Rear axle of the ego vehicle, shape (moments, 5).
+    ego: NDArray[np.float64]
+    #: Centre of each other road user, by its number, shape (its moments, 5).
+    npc: Dict[int, NDArray[np.float64]]
+
 class Finding(TypedDict):
     """A collision of the ego vehicle, judged."""
 
@@ -106,6 +184,20 @@ class Ended(TypedDict):
     #: Number of counted collisions.
     counted: int
     findings: List[Finding]
+    #: By rising time.
+    breaches: List[Breach]
+    #: Smallest margin of each requirement in force, SI; `None` of one that was never asked for, or that has none.
+    margins: Dict[str, Optional[float]]
+    measures: Measures
+    #: What was carried out, one entry for each step: `Episodes.evaluate` plays it again.
+    steps: List[Carried]
+
+class Evaluated(Ended, total=False):
+    """A whole episode that was played."""
+
+    seed: int
+    #: Only with `trajectory=True`.
+    trajectory: Trajectories
 
 class Info(TypedDict, total=False):
     seed: int
@@ -119,6 +211,10 @@ class Info(TypedDict, total=False):
     row: int
     #: Why the chosen row was not carried out; `None` if it was.
     refused: Optional[str]
+    #: What it drew, by name: numbers in SI, words of choices.
+    values: Dict[str, Drawn]
+    #: How near the step came to a collision.
+    measures: Measures
     #: Contacts of the ego vehicle that began in the step.
     collisions: int
     #: Those of them that count; only with `reward="judged"`.
@@ -163,13 +259,51 @@ class Episodes:
         external driving system fails as the episode begins.
         """
 
-    def step(self, row: Optional[int]) -> Tuple[NDArray[np.float32], float, Optional[str], Info]:
+    def step(self, row: Optional[int], values: Optional[Mapping[str, Drawn]] = None) -> Tuple[NDArray[np.float32], float, Optional[str], Info]:
         """Carries a row out and drives for one observation period (`Space.step_s`): observation, reward, how the episode
         ended (`None`: it goes on), and what else is to say.
 
         An illegal row loses the step: nothing happens in it but driving, and `refused` says which rule forbids it. `None`
         passes, and so does any row while none is legal. An episode goes on after a collision. Collisions are judged when
         it ends: `info["ended"]`. Raises `EpisodeError` if there is no such row.
+
+        `values` gives some of what the row draws, by name. Each number is moved to the nearest legal one; what is not given is
+        drawn. `Space.draws` says names and bounds. Raises `ValueError` or `TypeError` for a name or value that the row does not
+        draw.
+        """
+
+    def evaluate(self, seed: int, steps: Sequence[Chosen] = (), *, trajectory: bool = False) -> Evaluated:
+        """Plays the whole episode of a seed: one entry of `steps` in each step, and then nothing until it ends.
+
+        This is for searches: nothing is compiled, and nobody asks what is legal. It is then the episode under way, so `save`
+        writes it. To play several at once, give each thread a `sibling()`. Raises as `step` does.
+        """
+
+    def save(self, path: _Path, *, repeat: int = 0) -> None:
+        """Writes the episode so far as a scenario, as `avastra run` does: cut after its last counted collision or breach, with
+        what was found as claims; or the whole of it if nothing was found. An existing file is replaced.
+
+        With `repeat`, the file says how often each finding recurs in up to so many plays under other noise. Raises `ValueError`
+        if the name does not end in `.ava`, if the space's file does not hold the space (write the text of `Space.from_text`
+        first), or if the file cannot be written.
+        """
+
+    def save_policy(self, path: _Path, layers: Sequence[Tuple[NDArray[np.float32], NDArray[np.float32]]], *, by: str,
+                    seed: int = 0, episodes: int = 0, masked: bool = True) -> None:
+        """Writes a network that was trained elsewhere as a policy, which `avastra run --policy` plays. In each step, it carries out
+        the row of the largest output.
+
+        Args:
+            path: Ends in `.ava`. An existing file is replaced.
+            layers: Weights, shape (outputs, inputs), and biases, shape (outputs,), of each layer, as PyTorch's `Linear` holds
+                them, with ReLU between them. The first has the scaled observation as inputs, shape (36,), the last one output
+                for each row.
+            by: Who trained it: the policy's origin says so.
+            seed, episodes: Those of the training, for its origin.
+            masked: Whether only legal rows are chosen. If not, an illegal choice loses its step.
+
+        Raises:
+            ValueError: The layers do not fit, or the file cannot be written.
         """
 
     def findings(self) -> List[Finding]:

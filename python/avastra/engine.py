@@ -8,21 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 try:
-    from ._native import (ENGINE, EpisodeError, Episodes, Snapshot, Space, SpaceError, Variable, episode_seed,
+    from ._native import (ENGINE, Draw, EpisodeError, Episodes, Snapshot, Space, SpaceError, Variable, episode_seed,
                           read_table, recurs, step_all, variables)
 except ImportError as error:
     raise ImportError("the engine of avastra is not built: `pip install ./python` in its repository does it, "
                       "and needs Rust") from error
 
 __all__ = [
-    "ENGINE", "EpisodeError", "Episodes", "Snapshot", "Space", "SpaceError", "Variable", "compile", "episode_seed",
+    "ENGINE", "Draw", "EpisodeError", "Episodes", "Snapshot", "Space", "SpaceError", "Variable", "compile", "episode_seed",
     "read_run", "recurs", "step_all", "variables",
 ]
 
 _Path = Union[str, "os.PathLike[str]"]
 
 #: Tables of `run.db` that `read_run` reads.
-TABLES = ("episode", "step", "collision", "learning")
+TABLES = ("episode", "step", "collision", "breach", "margin", "failure", "held", "offer", "reason", "learning")
 
 
 def _reduced(space: Space) -> Tuple[Any, ...]:
@@ -50,8 +50,14 @@ def compile(path: _Path) -> Space:
 
 
 def read_run(directory: _Path) -> "Dict[str, Dict[str, NDArray[np.generic]]]":
-    """What a run or a training wrote: for each of the tables `episode`, `step`, `collision` and `learning` a dict of
-    NumPy arrays of equal length, by the names of the columns of `run.db`.
+    """What a run or a training wrote: for each table of `TABLES` a dict of NumPy arrays of equal length, by the names of
+    the columns of `run.db`.
+
+    - `episode`, `step`, `collision`, `breach` (of requirements), `failure` (of a driving system of your own)
+    - `margin`: the smallest margin of each requirement in an episode
+    - `held`: what limited the ego vehicle's speed, and from when on
+    - `offer`: how often a row was refused, with the number of its `reason`
+    - `learning`: the episodes of a training
 
     Rows come by rising key: `episode["episode"]`, then `step["step"]` or `collision["number"]`. Names end in the unit;
     the state variables of `step` are those of `variables()`, by their `column`. Numbers are `float64` (NaN: none) and

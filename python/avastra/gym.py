@@ -38,6 +38,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from .engine import EpisodeError, Episodes, Space, step_all, variables
+from .serve import listen
 
 __all__ = ["Env", "VectorEnv"]
 
@@ -61,7 +62,7 @@ class Env(gymnasium.Env[Observation, np.int64]):
         reward: `judged`, or `space` for the reward that the space declares: as in `avastra.Episodes`.
         mask: `info`, or `observation` for a dict of `observation` and `action_mask`.
         **conditions: Those of `avastra.Episodes`: `ads`, `ads_config`, `ads_cmd`, `ambient`, `traffic`, `with_rules`,
-            `without_rules`.
+            `without_rules`. Here `ads` may also be a class derived from `avastra.Driver`, which then drives in this process.
 
     Raises:
         SpaceError: The space has mistakes; its text is what `avastra check` prints.
@@ -99,7 +100,7 @@ class Env(gymnasium.Env[Observation, np.int64]):
         if options:
             raise ValueError(f"no option `{next(iter(options))}`: `reset` takes `seed` alone")
         super().reset(seed=seed)
-        seed = _drawn(self.np_random) if seed is None else _whole(seed, "seed")
+        seed = draw_seed(self.np_random) if seed is None else whole(seed, "seed")
         observation, self._legal = self.episodes.reset(seed)
         return self._shown(observation), {"seed": seed, "action_mask": self._legal.copy()}
 
@@ -126,7 +127,7 @@ class Env(gymnasium.Env[Observation, np.int64]):
             EpisodeError: There is no such row, or the episode has ended: `reset` begins the next one.
             TypeError: The action is no whole number.
         """
-        observation, reward, end, info = self.episodes.step(_whole(action, "action"))
+        observation, reward, end, info = self.episodes.step(whole(action, "action"))
         # What the caller does with its info is not done to what is legal.
         self._legal = info["action_mask"].copy()
         terminated = _is_terminal(end)
@@ -214,7 +215,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
             if which.shape != (self.num_envs,) or not which.any():
                 raise ValueError(f"`reset_mask` has {self.num_envs} values, at least one of them true")
         if seed is None or isinstance(seed, (int, np.integer)):
-            seed = [None if seed is None else _whole(seed, "seed") + world for world in range(self.num_envs)]
+            seed = [None if seed is None else whole(seed, "seed") + world for world in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise ValueError(f"{self.num_envs} worlds need as many seeds")
         infos = self._begin(np.flatnonzero(which), seed, {})
@@ -242,7 +243,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
             raise EpisodeError(f"the episodes of worlds {begin} have ended: reset them with `reset_mask`")
         drawn, generators = self._draw(begin)
         seeds = [drawn.get(world) for world in range(self.num_envs)]
-        rows = [_whole(action, "action") for action in actions]
+        rows = [whole(action, "action") for action in actions]
         observations, legal, rewards, ends, found = step_all(self.worlds, rows, seeds, self.threads)
         self._generators.update(generators)
         self._observations, self._legal = observations, legal
@@ -269,7 +270,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
 
     def _begin(self, worlds: np.ndarray, seeds: Sequence[Optional[int]], infos: Dict[str, Any]) -> Dict[str, Any]:
         """Begins the next episodes of some worlds and adds their infos. A seed also begins a world's own sequence of seeds."""
-        given = {world: _whole(seed, "seed") for world, seed in enumerate(seeds) if seed is not None}
+        given = {world: whole(seed, "seed") for world, seed in enumerate(seeds) if seed is not None}
         own, generators = self._draw([world for world in worlds.tolist() if world not in given])
         generators.update({world: seeding.np_random(given[world])[0] for world in worlds.tolist() if world in given})
         drawn = [given[world] if world in given else own[world] for world in worlds.tolist()]
@@ -303,7 +304,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
         """The seeds of the next episodes of some worlds, and the generators as they are once these have begun."""
         known = self._generators
         generators = {world: copy.deepcopy(known[world]) if world in known else seeding.np_random(None)[0] for world in worlds}
-        return {world: _drawn(generator) for world, generator in generators.items()}, generators
+        return {world: draw_seed(generator) for world, generator in generators.items()}, generators
 
     def _shown(self) -> Observation:
         return _with_mask(self._observations.copy(), self._legal) if self._is_masked else self._observations.copy()
@@ -315,6 +316,10 @@ def _compiled(space: "Union[str, os.PathLike[str], Space]") -> Space:
 
 def _episodes(space: Space, road: Optional[str], observation: _Seen, reward: _Reward,
               conditions: Dict[str, Any]) -> Episodes:
+    ads = conditions.get("ads")
+    if callable(ads):
+        conditions = {name: value for name, value in conditions.items() if name != "ads"}
+        conditions["ads_cmd"] = listen(ads).address
     return Episodes(space, road or space.roads[0], observation=observation, reward=reward, **conditions)
 
 
@@ -351,7 +356,7 @@ def _with_whole_seed(info: Mapping[str, Any]) -> Dict[str, Any]:
     return {**info, "seed": np.uint64(info["seed"])}
 
 
-def _whole(value: Any, what: str) -> int:
+def whole(value: Any, what: str) -> int:
     """A whole number as it is. `int` would cut a share off, and would read a text."""
     if not isinstance(value, (bool, np.bool_)):
         try:
@@ -365,7 +370,7 @@ def _is_terminal(end: Optional[str]) -> bool:
     return end == "arrived"
 
 
-def _drawn(generator: np.random.Generator) -> int:
+def draw_seed(generator: np.random.Generator) -> int:
     return int(generator.integers(2**63))
 
 

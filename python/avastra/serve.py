@@ -4,11 +4,14 @@ Standard output belongs to the protocol. So at the beginning its descriptor is m
 of 2: whatever your code or a native library prints goes to standard error, from C++ too.
 """
 
+import io
 import json
 import os
+import socket
 import sys
+import threading
 import traceback
-from typing import IO, Any, Callable, Dict, Iterable, Optional
+from typing import IO, Any, Callable, Dict, Iterable, Optional, Union
 
 from . import messages
 from .driver import Driver
@@ -39,7 +42,58 @@ def serve(driver: Callable[[], Driver]) -> None:
     os._exit(status)
 
 
-def converse(driver: Callable[[], Driver], lines: Iterable[bytes], out: IO[bytes]) -> int:
+class Listener:
+    """Serves drivers over TCP on this machine alone, each connection in a thread of its own."""
+
+    def __init__(self, driver: Callable[[], Driver]) -> None:
+        self._driver = driver
+        self._socket = socket.create_server(("127.0.0.1", 0))
+        threading.Thread(target=self._accept, name="avastra.listen", daemon=True).start()
+
+    @property
+    def address(self) -> str:
+        """As `--ads` and `ads_cmd` take it: `tcp:127.0.0.1:PORT`."""
+        return f"tcp:127.0.0.1:{self._socket.getsockname()[1]}"
+
+    def close(self) -> None:
+        """Takes no further connection."""
+        self._socket.close()
+
+    def __enter__(self) -> "Listener":
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                connection, _ = self._socket.accept()
+            except OSError:  # closed
+                return
+            threading.Thread(target=self._converse, args=(connection,), daemon=True).start()
+
+    def _converse(self, connection: socket.socket) -> None:
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        with connection, connection.makefile("rb") as lines, connection.makefile("wb", buffering=0) as out:
+            try:
+                converse(self._driver, lines, out)
+            except OSError:  # the simulator is gone
+                pass
+
+
+def listen(driver: Callable[[], Driver]) -> Listener:
+    """Serves a driver (a class, or a function that makes one) in this process, for episodes that this process plays:
+
+        with avastra.listen(Cruise) as listener:
+            episodes = avastra.Episodes(space, "crossroad", ads_cmd=listener.address)
+
+    Several episodes may be driven at once, so drivers must not share what they change.
+    """
+    return Listener(driver)
+
+
+def converse(driver: Callable[[], Driver], lines: Iterable[bytes], out: Union[IO[bytes], io.RawIOBase]) -> int:
     """The conversation itself, over any two streams; returns the exit status that `serve` ends with."""
     def say(message: Dict[str, Any]) -> None:
         out.write(json.dumps(message, separators=(",", ":"), allow_nan=False).encode() + b"\n")

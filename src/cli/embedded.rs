@@ -4,13 +4,22 @@
 use std::path::{Path, PathBuf};
 
 use avastra_base::outside::Shown;
-use avastra_campaign::run::Run;
+use avastra_campaign::emit;
+use avastra_campaign::episode::{EpisodeLog, Script, Setup};
+use avastra_campaign::run::{EpisodeSummary, Run};
+use avastra_lang::check::Loaded;
+use avastra_lang::model::{Policy, Space};
 use avastra_lang::syntax::{DiagnosticRecord, Style, record, render};
+use avastra_search::agent::{QPolicy, Settings, by_name};
 use avastra_world::action::ActionTable;
 
 use super::arguments::{ConditionArguments, RuleArguments};
 use super::conditions::settings;
+use super::error::Failure;
+use super::files::write_named;
 use super::load;
+use super::run_directory::Player;
+use super::train::origin;
 
 /// A space that was read, and what there is to say of it.
 pub struct Compiled {
@@ -41,7 +50,20 @@ pub enum Unusable {
 /// If it cannot be read, has mistakes, or declares no action.
 pub fn compile(path: &Path) -> Result<Compiled, Unusable> {
     load::forget();
-    let mut loaded = load::read_and_check(path).map_err(|error| Unusable::File(error.to_string()))?;
+    compiled(path, load::read_and_check(path))
+}
+
+/// Does the same for a text, as if it were the file at a path.
+///
+/// # Errors
+/// As [`compile`].
+pub fn compile_text(path: &Path, text: &str) -> Result<Compiled, Unusable> {
+    load::forget();
+    compiled(path, load::check_text(path, text))
+}
+
+fn compiled(path: &Path, loaded: Result<Loaded, Failure>) -> Result<Compiled, Unusable> {
+    let mut loaded = loaded.map_err(|error| Unusable::File(error.to_string()))?;
     let said = |diagnostic| Said {
         record: record(diagnostic, &loaded.sources),
         text: render(diagnostic, &loaded.sources, Style::Plain),
@@ -55,6 +77,123 @@ pub fn compile(path: &Path) -> Result<Compiled, Unusable> {
         Some(space) => Ok(Compiled { table: ActionTable::new(space), diagnostics }),
         None => Err(Unusable::File(format!("`{}` is no space: it declares no action", path.shown()))),
     }
+}
+
+/// Writes an episode as a scenario file: what was found in it, or else the whole of it. With replays, the file says how often each
+/// finding recurs.
+///
+/// # Errors
+/// In words: the space's file is not there or means something else, or the scenario cannot be written.
+pub fn save(run: &Run, setup: &Setup, log: &EpisodeLog, path: &Path, replays: u32) -> Result<(), String> {
+    is_named_and_there(run.table().space(), path)?;
+    let mut summary = EpisodeSummary::judged(setup, 0, log);
+    summary.find_keepers(setup, log);
+    summary.find_recurrence(setup, &Script::of_log(log), log, replays);
+    let conditions = &run.settings().conditions;
+    let player = Player { command: "Episodes.save", table: run.table(), agent: "python", conditions };
+    player.write_named(path, (log, &summary)).map_err(|error| error.to_string())
+}
+
+/// A network that another program trained on the scaled observation.
+#[derive(Debug, Clone)]
+pub struct Trained {
+    /// Between two layers, what is below 0 becomes 0.
+    pub layers: Vec<Layer>,
+    /// Whether it chooses among legal rows alone. If not, an illegal choice loses its step.
+    pub is_masked: bool,
+    /// Who trained it, in a few words: the origin's agent.
+    pub by: String,
+    pub seed: u64,
+    pub episodes: u64,
+}
+
+/// A layer of a network.
+#[derive(Debug, Clone)]
+pub struct Layer {
+    pub inputs: usize,
+    /// For each output, the weights of all inputs.
+    pub weights: Vec<f32>,
+    /// One for each output.
+    pub biases: Vec<f32>,
+}
+
+/// Writes a network as a policy that takes the row of the largest output. It has no claims and no rules: `policy distil` makes these.
+///
+/// # Errors
+/// In words: the layers do not fit each other, the observation or the table, or the file cannot be written.
+pub fn save_policy(run: &Run, path: &Path, trained: &Trained) -> Result<(), String> {
+    let table = run.table();
+    is_named_and_there(table.space(), path)?;
+    let Some(Ok(Settings::Learning(preset))) =
+        by_name("ddqn").and_then(|entry| Settings::from_yaml(entry, None, ""))
+    else {
+        unreachable!("ddqn learns, and its preset is sound")
+    };
+    let mut settings = *preset;
+    settings.network.dueling = false;
+    settings.network.hidden_units =
+        trained.layers.iter().rev().skip(1).rev().map(|layer| layer.biases.len()).collect();
+    settings.choice.masks_choice = trained.is_masked;
+    settings.exploration.evaluation_epsilon = 0.0;
+    let wanted = QPolicy::shape(&settings, table.rows().len());
+    let widths = |layers: &[usize]| layers.iter().map(ToString::to_string).collect::<Vec<_>>().join("-");
+    let inputs = trained.layers.first().map_or(0, |layer| layer.inputs);
+    let outputs = trained.layers.iter().map(|layer| layer.biases.len());
+    let given: Vec<usize> = core::iter::once(inputs).chain(outputs).collect();
+    let fits = |(index, layer): (usize, &Layer)| {
+        layer.inputs == given[index] && layer.weights.len() == layer.inputs * layer.biases.len()
+    };
+    if given != wanted.layers || !trained.layers.iter().enumerate().all(fits) {
+        return Err(format!(
+            "the network has {} units; here it needs {}: the scaled observation, hidden layers, and one output for each row",
+            widths(&given),
+            widths(&wanted.layers)
+        ));
+    }
+    let ours = |Layer { inputs, weights, biases }: &Layer| {
+        // Ours has the weights of all outputs for each input.
+        let of_input = |input: usize| weights.iter().copied().skip(input).step_by(*inputs);
+        (0..*inputs).flat_map(of_input).chain(biases.iter().copied()).collect::<Vec<f32>>()
+    };
+    let parameters: Vec<f32> = trained.layers.iter().flat_map(ours).collect();
+    if !parameters.iter().all(|parameter| parameter.is_finite()) {
+        return Err("a weight is not finite".to_owned());
+    }
+    let Trained { by, seed, episodes, .. } = trained;
+    let conditions = &run.settings().conditions;
+    let policy = Policy {
+        name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        docs: vec![format!("{by}, trained elsewhere; nothing was evaluated.")],
+        origin: origin(conditions, run.arena().attached().as_ref(), by, (*seed, *episodes)),
+        layers: wanted.layers,
+        dueling: false,
+        hyperparameters: settings.record(),
+        parameters,
+        claims: None,
+        rules: Vec::new(),
+        digest: String::new(),
+    };
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let space = table.space();
+    let relative = load::relative(folder, &space.path).map_err(|error| error.to_string())?;
+    let text = emit::policy_text(&policy, space, &relative, "Episodes.save_policy");
+    write_named(path, &text).map_err(|error| error.to_string())
+}
+
+/// Whether a file may be written there that names the space's file.
+fn is_named_and_there(space: &Space, path: &Path) -> Result<(), String> {
+    if path.extension().is_none_or(|extension| extension != "ava") {
+        return Err(format!("`{}` is no name of a file of the language: end it with `.ava`", path.shown()));
+    }
+    // What is written names the file of its space.
+    let there = compile(&space.path).ok().map(|there| there.table.space().meaning.seal());
+    if there == Some(space.meaning.seal()) {
+        return Ok(());
+    }
+    Err(format!(
+        "`{}` does not hold this space: write its text there first, because what is saved names the file of its space",
+        space.path.shown()
+    ))
 }
 
 /// The conditions of episodes, in the words of `avastra run`.

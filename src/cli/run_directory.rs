@@ -28,7 +28,7 @@ use avastra_world::sim::ENGINE;
 
 use super::campaign::{Campaign, KINDS, Kind, Outside};
 use super::error::Failure;
-use super::files::{folder, make, make_first, write, write_answers};
+use super::files::{folder, make, make_first, write, write_answers, write_named};
 use super::load;
 use super::output::{Output, for_shell, plural};
 use super::{pack, shard};
@@ -643,6 +643,17 @@ impl Player<'_> {
         write_answers(path, log)?;
         write(path, &text)?;
         Ok(text)
+    }
+
+    /// Writes an episode to a file that the user named: what was found in it, or else the whole of it.
+    pub fn write_named(&self, path: &Path, (log, summary): Judged) -> Result<(), Failure> {
+        let emitted = |source: &emit::Provenance| match summary.first_found(log) {
+            Some(about) => emit::scenario(self.table, (log, summary), about, source),
+            None => emit::whole(self.table, log, "Nothing was found in it.", source),
+        };
+        let text = self.file(path, summary.episode, &emitted)?;
+        write_answers(path, log)?;
+        write_named(path, &text)
     }
 
     /// The text of a scenario that has the name of the file.

@@ -365,27 +365,15 @@ fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Pol
         _ => format!("{}_{}", settings.agent, settings.seed),
     };
     let network = acting.network();
-    let attached = training.arena().attached();
-    let attached = attached.as_ref();
-    let profile = settings.conditions.profile.as_ref();
-    let (line, digest) = profile.map(|profile| (profile.settings.to_line(), profile.digest.clone())).unzip();
     let policy = Policy {
         name,
         docs: vec![headline(settings, evaluation)],
-        origin: PolicyOrigin {
-            agent: settings.agent.clone(),
-            seed: settings.seed,
-            episodes: u64::from(settings.episodes),
-            roads: settings.conditions.roads.clone(),
-            ads: settings.conditions.ads.clone(),
-            profile: line.filter(|line| !line.is_empty()).or_else(|| attached.map(Attached::to_line)),
-            profile_digest: digest.or_else(|| attached.map(Attached::digest)),
-            traffic: settings.conditions.traffic.as_ref().map(TrafficRecord::in_words),
-            engine: settings.conditions.engine.clone(),
-            avastra: settings.conditions.avastra.clone(),
-            with: settings.conditions.with.clone(),
-            without: settings.conditions.without.clone(),
-        },
+        origin: origin(
+            &settings.conditions,
+            training.arena().attached().as_ref(),
+            &settings.agent,
+            (settings.seed, u64::from(settings.episodes)),
+        ),
         layers: network.shape().layers.clone(),
         dueling: network.shape().dueling,
         hyperparameters: acting.settings().record(),
@@ -406,12 +394,37 @@ fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Pol
     distil::with_rules(training.arena(), acting, policy)
 }
 
+/// Who was trained, against what and for how long: a seed and a number of episodes.
+pub fn origin(
+    conditions: &Conditions,
+    attached: Option<&Attached>,
+    agent: &str,
+    (seed, episodes): (u64, u64),
+) -> PolicyOrigin {
+    let profile = conditions.profile.as_ref();
+    let (line, digest) = profile.map(|profile| (profile.settings.to_line(), profile.digest.clone())).unzip();
+    PolicyOrigin {
+        agent: agent.to_owned(),
+        seed,
+        episodes,
+        roads: conditions.roads.clone(),
+        ads: conditions.ads.clone(),
+        profile: line.filter(|line| !line.is_empty()).or_else(|| attached.map(Attached::to_line)),
+        profile_digest: digest.or_else(|| attached.map(Attached::digest)),
+        traffic: conditions.traffic.as_ref().map(TrafficRecord::in_words),
+        engine: conditions.engine.clone(),
+        avastra: conditions.avastra.clone(),
+        with: conditions.with.clone(),
+        without: conditions.without.clone(),
+    }
+}
+
 /// Writes `policy/NAME.ava`.
 fn write_policy(policy: &Policy, space: &Space, directory: &Path) -> Result<PathBuf, Failure> {
     let folder = folder(directory, "policy")?;
     let space_path = load::relative(&folder, &space.path)?;
     let path = folder.join(format!("{}.ava", policy.name));
-    write(&path, &emit::policy_text(policy, space, &space_path))?;
+    write(&path, &emit::policy_text(policy, space, &space_path, "train"))?;
     Ok(path)
 }
 

@@ -269,11 +269,11 @@ proptest! {
                 states, fidelity: share, regret: 3.0 * share, collisions: 3, counted: 2, colliding: 1, return_mean, trace,
             });
         }
-        let text = policy_text(&policy, space(), "avastra45.ava");
+        let text = policy_text(&policy, space(), "avastra45.ava", "train");
         let found = load(&text);
         policy.digest = found.as_ref().map(|found| found.digest.clone()).unwrap_or_default();
         prop_assert_eq!(found, Ok(policy.clone()));
-        prop_assert_eq!(policy_text(&policy, space(), "avastra45.ava"), text);
+        prop_assert_eq!(policy_text(&policy, space(), "avastra45.ava", "train"), text);
     }
 
     /// A bit is flipped anywhere in the text of a policy.

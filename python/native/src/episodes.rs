@@ -3,20 +3,23 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use avastra::action::ActionTable;
 use avastra::agent::{Features, LearnerSettings, Settings, by_name};
-use avastra::cli::embedded::{Conditions, run};
-use avastra::episode::{Collision, EpisodeLog, Outcome};
+use avastra::cli::embedded::{Conditions, Layer, Trained, run, save_policy};
+use avastra::episode::{Collision, EpisodeLog, StepLog};
 use avastra::mdp::{Observation, RewardSettings};
 use avastra::model::policy::VARIABLES;
 use avastra::rng::{Stream, child_seed};
-use avastra::run::{Finding, Run, Stepped};
-use numpy::PyArray1;
+use avastra::run::{Chosen, Finding, Measures, Run, Stepped};
+use avastra::sim::World;
+use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::info::{findings, info};
+use crate::chosen::{Trajectories, chosen, values_of};
+use crate::info::{ended_dict, findings, info};
 use crate::space::Space;
 
 create_exception!(
@@ -74,8 +77,9 @@ pub struct Step {
     pub reward: f64,
     pub time_s: f64,
     pub proc: f64,
-    pub row: Option<usize>,
-    pub refused: Option<String>,
+    /// What was carried out, or why nothing was.
+    pub log: StepLog,
+    pub measures: Measures,
     pub collisions: usize,
     /// Counted collisions of the step, where they are judged at once.
     pub counted: Option<usize>,
@@ -85,6 +89,14 @@ pub struct Step {
 pub struct Ended {
     pub log: EpisodeLog,
     pub findings: Vec<Finding>,
+    pub measures: Measures,
+}
+
+impl Ended {
+    fn of(stepped: &mut Stepped) -> Ended {
+        let measures = stepped.measures().iter().fold(Measures::default(), |all, step| all.and(step));
+        Ended { log: stepped.log(), findings: stepped.findings().to_vec(), measures }
+    }
 }
 
 #[pymethods]
@@ -171,19 +183,106 @@ impl Episodes {
     /// An illegal row loses the step: nothing happens in it but driving, and `refused` says which rule forbids it. `None`
     /// passes, and so does any row while none is legal. An episode goes on after a collision. Collisions are judged when
     /// it ends: `info["ended"]`. Raises `EpisodeError` if there is no such row.
-    #[pyo3(signature = (row))]
+    ///
+    /// `values` gives some of what the row draws, by name: numbers in SI, words of choices. Each number is moved to the nearest
+    /// legal one; what is not given is drawn. `Space.draws` says names and bounds.
+    #[pyo3(signature = (row, values=None))]
     #[allow(clippy::type_complexity, reason = "the tuple that Python gets")]
     fn step<'py>(
         &self,
         py: Python<'py>,
         row: Option<i64>,
+        values: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<(Array<'py, f32>, f64, Option<&'static str>, Bound<'py, PyDict>)> {
         let row = self.row(row).map_err(EpisodeError::new_err)?;
-        let seen = py.detach(|| self.advance(&mut self.now(), row)).map_err(EpisodeError::new_err)?;
-        let info = info(py, &seen)?;
+        let seen = match (row, values) {
+            (Some(row), Some(given)) => {
+                let row = self.known(row).map_err(EpisodeError::new_err)?;
+                let chosen = Chosen { row, values: values_of(self.run.table(), row, given)? };
+                py.detach(|| self.advance_with(&mut self.now(), &chosen))
+            }
+            _ => py.detach(|| self.advance(&mut self.now(), row)),
+        };
+        let seen = seen.map_err(EpisodeError::new_err)?;
+        let info = info(py, self.run.table(), &seen)?;
         info.set_item("action_mask", PyArray1::from_slice(py, &seen.legal))?;
         let (reward, end) = (seen.reward(), seen.end());
         Ok((PyArray1::from_vec(py, seen.observation), reward, end, info))
+    }
+
+    /// Plays the whole episode of a seed: one entry of `steps` in each step, and then nothing until it ends. An entry is a row, a row
+    /// and a dict of values as `step` takes it, or `None`. It is then the episode under way, so `save` writes it.
+    ///
+    /// The result has what `info["ended"]` has, and with `trajectory` where everybody was.
+    #[pyo3(signature = (seed, steps=Vec::new(), *, trajectory=false))]
+    fn evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        seed: u64,
+        steps: Vec<Bound<'py, PyAny>>,
+        trajectory: bool,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let steps = steps.iter().map(|step| chosen(self.run.table(), step)).collect::<PyResult<Vec<_>>>()?;
+        let mut trajectories = Trajectories::default();
+        let play = || {
+            let mut now = self.now();
+            let stepped = now.insert(Stepped::new(&self.run.setup_of(0, seed)));
+            let mut watch = |world: &World| {
+                if trajectory {
+                    trajectories.note(world);
+                }
+            };
+            stepped.to_the_end(&steps, &mut watch).map_err(|error| error.to_string())?;
+            Ok(Ended::of(stepped))
+        };
+        let ended = py.detach(play).map_err(|reason: String| EpisodeError::new_err(reason))?;
+        let told = ended_dict(py, self.run.table(), &ended)?;
+        told.set_item("seed", seed)?;
+        if trajectory {
+            told.set_item("trajectory", trajectories.told(py)?)?;
+        }
+        Ok(told)
+    }
+
+    /// Writes the episode so far as a scenario, as `avastra run` writes it: what was found in it, or else the whole of it. With
+    /// `repeat`, the file says how often each finding recurs in up to so many plays under other noise. An existing file is
+    /// replaced. The space's file must lie where the space was read from.
+    #[pyo3(signature = (path, *, repeat=0))]
+    fn save(&self, py: Python<'_>, path: PathBuf, repeat: u32) -> PyResult<()> {
+        let save = || {
+            let now = self.now().clone().ok_or_else(|| NOT_BEGUN.to_owned())?;
+            avastra::cli::embedded::save(&self.run, now.setup(), &now.log(), &path, repeat)
+        };
+        py.detach(save).map_err(PyValueError::new_err)
+    }
+
+    /// Writes a network that was trained elsewhere as a policy: `avastra run --policy` plays it. In each step, the row of the largest
+    /// output is carried out.
+    ///
+    /// `layers` has weights, shape (outputs, inputs), and biases of each layer, as PyTorch's `Linear` holds them, with ReLU
+    /// between them. The first has the scaled observation as inputs, the last one output for each row. `by` says who trained it.
+    /// With `masked`, only legal rows are chosen.
+    #[pyo3(signature = (path, layers, *, by, seed=0, episodes=0, masked=true))]
+    #[allow(clippy::too_many_arguments, reason = "keyword arguments of Python")]
+    fn save_policy(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        layers: Vec<(PyReadonlyArray2<'_, f32>, PyReadonlyArray1<'_, f32>)>,
+        by: String,
+        seed: u64,
+        episodes: u64,
+        masked: bool,
+    ) -> PyResult<()> {
+        let layers = layers
+            .iter()
+            .map(|(weights, biases)| {
+                let (weights, biases) = (weights.as_array(), biases.as_array().to_vec());
+                Layer { inputs: weights.ncols(), weights: weights.iter().copied().collect(), biases }
+            })
+            .collect();
+        let trained = Trained { layers, is_masked: masked, by, seed, episodes };
+        py.detach(|| save_policy(&self.run, &path, &trained)).map_err(PyValueError::new_err)
     }
 
     /// The collisions of the episode so far, judged. A verdict does not change any more.
@@ -272,6 +371,25 @@ impl Episodes {
         self.view.of(now.insert(Stepped::new(&self.run.setup_of(0, seed))))
     }
 
+    /// A row that there is.
+    fn known(&self, row: usize) -> Result<usize, String> {
+        let last = self.run.table().rows().len() - 1;
+        if row <= last { Ok(row) } else { Err(format!("no row {row}: the table has rows 0 to {last}")) }
+    }
+
+    /// Steps the episode under way, with values of the caller.
+    fn advance_with(&self, now: &mut Option<Stepped>, chosen: &Chosen) -> Result<Seen, String> {
+        let stepped = now.as_mut().ok_or(NOT_BEGUN)?;
+        stepped.step_with(chosen).map_err(|error| error.to_string())?;
+        let step = self.view.step(stepped);
+        Ok(Seen { step: Some(step), ..self.view.of(stepped) })
+    }
+
+    /// The table of its space.
+    pub fn table(&self) -> &ActionTable {
+        self.run.table()
+    }
+
     /// Steps the episode under way.
     pub fn advance(&self, now: &mut Option<Stepped>, row: Option<usize>) -> Result<Seen, String> {
         let stepped = now.as_mut().ok_or(NOT_BEGUN)?;
@@ -301,8 +419,7 @@ impl Seen {
 impl View {
     /// A moment, without what became of the step before.
     fn of(&self, stepped: &mut Stepped) -> Seen {
-        let ended =
-            stepped.end().map(|_| Ended { log: stepped.log(), findings: stepped.findings().to_vec() });
+        let ended = stepped.end().map(|_| Ended::of(stepped));
         let observation = stepped.observation();
         let raw =
             |observation: &Observation| (0..VARIABLES.len()).map(|index| observation.get(index)).collect();
@@ -327,15 +444,9 @@ impl View {
         let counts = |finding: &&Finding| finding.counted && is_now(&finding.collision);
         let counted = judged.map(|_| stepped.findings().iter().filter(counts).count());
         let step = &stepped.steps()[last];
-        let (row, refused) = match &step.outcome {
-            Outcome::Done { draw, .. } => (Some(draw.row), None),
-            Outcome::Passed => (None, None),
-            Outcome::Refused { rule, reason, .. } => {
-                (None, Some(rule.as_ref().map_or(reason.clone(), |rule| format!("{rule}: {reason}"))))
-            }
-        };
         let (time_s, proc, reward) = (step.time_s, step.proc, judged.unwrap_or(step.reward));
-        Step { reward, time_s, proc, row, refused, collisions, counted }
+        let (log, measures) = (step.clone(), stepped.measures()[last]);
+        Step { reward, time_s, proc, log, measures, collisions, counted }
     }
 }
 

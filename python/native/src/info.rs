@@ -1,5 +1,6 @@
 //! What is said of a moment and of its collisions, as dicts.
 
+use avastra::action::ActionTable;
 use avastra::model::digest_text;
 use avastra::model::vocabulary::Word as _;
 use avastra::oracle;
@@ -7,34 +8,49 @@ use avastra::run::Finding;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
+use crate::chosen::{breaches, carried_out, margins, measures};
 use crate::episodes::{Ended, Seen};
 
 /// What is said of a moment beside observation, reward and mask.
-pub fn info<'py>(py: Python<'py>, seen: &Seen) -> PyResult<Bound<'py, PyDict>> {
+pub fn info<'py>(py: Python<'py>, table: &ActionTable, seen: &Seen) -> PyResult<Bound<'py, PyDict>> {
     let info = PyDict::new(py);
     info.set_item("seed", seen.seed)?;
     if let Some(step) = &seen.step {
         info.set_item("time_s", step.time_s)?;
         info.set_item("proc", step.proc)?;
-        info.set_item("row", step.row.map_or(-1, |row| row as i64))?;
-        info.set_item("refused", &step.refused)?;
+        info.update(carried_out(py, table, &step.log)?.as_mapping())?;
+        info.set_item("measures", measures(py, &step.measures)?)?;
         info.set_item("collisions", step.collisions)?;
         if let Some(counted) = step.counted {
             info.set_item("counted", counted)?;
         }
     }
-    if let Some(Ended { log, findings: found }) = &seen.ended {
-        let end = PyDict::new(py);
-        end.set_item("end", log.end.name())?;
-        end.set_item("duration_s", log.duration_s)?;
-        end.set_item("distance_m", log.distance_m)?;
-        end.set_item("red_runs", log.red_runs)?;
-        end.set_item("trace", digest_text(&log.trace()))?;
-        end.set_item("counted", found.iter().filter(|finding| finding.counted).count())?;
-        end.set_item("findings", findings(py, found)?)?;
-        info.set_item("ended", end)?;
+    if let Some(ended) = &seen.ended {
+        info.set_item("ended", ended_dict(py, table, ended)?)?;
     }
     Ok(info)
+}
+
+/// What is said of an episode that has ended.
+pub fn ended_dict<'py>(
+    py: Python<'py>,
+    table: &ActionTable,
+    Ended { log, findings: found, measures: least }: &Ended,
+) -> PyResult<Bound<'py, PyDict>> {
+    let end = PyDict::new(py);
+    end.set_item("end", log.end.name())?;
+    end.set_item("duration_s", log.duration_s)?;
+    end.set_item("distance_m", log.distance_m)?;
+    end.set_item("red_runs", log.red_runs)?;
+    end.set_item("trace", digest_text(&log.trace()))?;
+    end.set_item("counted", found.iter().filter(|finding| finding.counted).count())?;
+    end.set_item("findings", findings(py, found)?)?;
+    end.set_item("breaches", breaches(py, table.space(), log)?)?;
+    end.set_item("margins", margins(py, table.space(), log)?)?;
+    end.set_item("measures", measures(py, least)?)?;
+    let steps = log.steps.iter().map(|step| carried_out(py, table, step));
+    end.set_item("steps", steps.collect::<PyResult<Vec<_>>>()?)?;
+    Ok(end)
 }
 
 /// Judged collisions as dicts, with the names of `run.db`'s columns.

@@ -4,6 +4,7 @@
 //! a learner sees them: observations raw or scaled, rewards of the space or judged. Python's lock is released while an
 //! episode drives.
 
+mod chosen;
 mod diagnostics;
 mod episodes;
 mod info;
@@ -29,6 +30,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("EpisodeError", module.py().get_type::<episodes::EpisodeError>())?;
     module.add_function(wrap_pyfunction!(main, module)?)?;
     module.add_class::<space::Space>()?;
+    module.add_class::<space::Draw>()?;
     module.add_class::<space::Variable>()?;
     module.add_class::<episodes::Episodes>()?;
     module.add_class::<episodes::Snapshot>()?;

@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 
 use avastra::action::ActionTable;
-use avastra::cli::embedded::{Said, compile};
+use avastra::action::DrawRecord;
+use avastra::cli::embedded::{Said, compile, compile_text};
 use avastra::model::policy::{VARIABLES, VariableKind};
+use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 
@@ -24,6 +26,35 @@ impl Space {
     fn new(py: Python<'_>, path: PathBuf) -> PyResult<Space> {
         let compiled = py.detach(|| compile(&path)).map_err(|reason| diagnostics::error(py, reason))?;
         Ok(Space { table: compiled.table, path, said: compiled.diagnostics })
+    }
+
+    /// The space in a text, as if it were the file at `path`, from where `use` finds other files. Nothing is written there.
+    #[staticmethod]
+    #[pyo3(signature = (text, path=PathBuf::from("space.ava")))]
+    fn from_text(py: Python<'_>, text: String, path: PathBuf) -> PyResult<Space> {
+        let compiled =
+            py.detach(|| compile_text(&path, &text)).map_err(|reason| diagnostics::error(py, reason))?;
+        Ok(Space { table: compiled.table, path, said: compiled.diagnostics })
+    }
+
+    /// What a row draws on a road: the values of choices, the bounds of numbers, SI.
+    #[pyo3(signature = (row, road=None))]
+    fn draws(&self, row: usize, road: Option<&str>) -> PyResult<Vec<Draw>> {
+        let rows = self.table.rows();
+        let row = rows.get(row).ok_or_else(|| {
+            PyIndexError::new_err(format!("no row {row}: the table has rows 0 to {}", rows.len() - 1))
+        })?;
+        let roads = self.roads();
+        let road = match road {
+            None => 0,
+            Some(name) => roads.iter().position(|road| *road == name).ok_or_else(|| {
+                PyValueError::new_err(format!("no road `{name}`: it has {}", roads.join(", ")))
+            })?,
+        };
+        let draws = self.table.draws(row, road).into_iter();
+        Ok(draws
+            .map(|DrawRecord { name, unit, low, high, values }| Draw { name, unit, low, high, values })
+            .collect())
     }
 
     /// The path that it was compiled from.
@@ -82,6 +113,28 @@ impl Space {
     fn __repr__(&self) -> String {
         let (rows, roads) = (self.table.rows().len(), self.roads().join(", "));
         format!("<avastra.Space {}: {rows} rows on {roads}>", self.path.display())
+    }
+}
+
+/// A value that a row draws.
+#[pyclass(frozen, get_all, module = "avastra")]
+pub struct Draw {
+    name: String,
+    unit: String,
+    low: Option<f64>,
+    high: Option<f64>,
+    values: Vec<String>,
+}
+
+#[pymethods]
+impl Draw {
+    fn __repr__(&self) -> String {
+        let Draw { name, unit, low, high, values } = self;
+        match (low, high) {
+            (Some(low), Some(high)) => format!("<avastra.Draw {name}: {low} to {high} {unit}>"),
+            _ if values.is_empty() => format!("<avastra.Draw {name}: any {unit}>"),
+            _ => format!("<avastra.Draw {name}: {}>", values.join(", ")),
+        }
     }
 }
 

@@ -40,7 +40,11 @@ pub fn step_all<'py>(
     let rows = worlds.iter().enumerate().map(row).collect::<Result<Vec<Option<usize>>, String>>();
     let rows = rows.map_err(EpisodeError::new_err)?;
     let seen = py.detach(|| play_all(&worlds, &rows, &seeds, threads)).map_err(EpisodeError::new_err)?;
-    let infos = seen.iter().map(|seen| info(py, seen)).collect::<PyResult<_>>()?;
+    let infos = worlds
+        .iter()
+        .zip(&seen)
+        .map(|(world, seen)| info(py, world.table(), seen))
+        .collect::<PyResult<_>>()?;
     let (ends, rewards) = (seen.iter().map(Seen::end).collect(), seen.iter().map(Seen::reward).collect());
     let (mut observations, mut masks) = (Vec::new(), Vec::new());
     let (width, rows) = seen.first().map_or((0, 0), |seen| (seen.observation.len(), seen.legal.len()));

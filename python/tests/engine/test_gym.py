@@ -27,14 +27,17 @@ class Page(unittest.TestCase):
     def test_the_examples_of_the_page_run(self):
         blocks = (ROOT / "python/README.md").read_text(encoding="utf-8").split("```python\n")[1:]
         sources = [block.split("```")[0] for block in blocks if "avastra.serve" not in block and "avastra.runs" not in block]
-        self.assertEqual(len(sources), 2)
+        self.assertEqual(len(sources), 3)
         here = os.getcwd()
         os.chdir(ROOT)
         try:
-            for source in sources:
-                names = {}
-                exec(source, names)
-                self.assertEqual(names["info"]["refused"], None)
+            with tempfile.TemporaryDirectory() as folder:
+                for source in sources:
+                    names = {}
+                    exec(source.replace("found.ava", f"{folder}/found.ava"), names)
+                    played = names["info"] if "info" in names else names["played"]["steps"][1]
+                    self.assertEqual(played["refused"], None)
+                self.assertEqual(os.listdir(folder), ["found.ava"])
         finally:
             os.chdir(here)
 

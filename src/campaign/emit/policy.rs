@@ -14,17 +14,17 @@ use avastra_lang::syntax::{ast, parse, print};
 
 use super::tree;
 
-/// The text of a policy file, sealed with a new digest; the policy's own digest is ignored. `space_path` is the
+/// The text of a policy file that a command emits, sealed with a new digest; the policy's own digest is ignored. `space_path` is the
 /// path from the file to its space.
-pub fn policy_text(policy: &Policy, space: &Space, space_path: &str) -> String {
+pub fn policy_text(policy: &Policy, space: &Space, space_path: &str, command: &str) -> String {
     // The seal covers the text, so the text is printed first without it.
-    let open = print(&file(policy, space, space_path, String::new()));
+    let open = print(&file(policy, space, space_path, (String::new(), command)));
     let (tree, mistakes) = parse(FileId(0), &open);
     debug_assert!(mistakes.is_empty(), "what is printed can be read");
-    print(&file(policy, space, space_path, seal(&open, &tree)))
+    print(&file(policy, space, space_path, (seal(&open, &tree), command)))
 }
 
-fn file(policy: &Policy, space: &Space, space_path: &str, digest: String) -> File {
+fn file(policy: &Policy, space: &Space, space_path: &str, (digest, command): (String, &str)) -> File {
     let net = Net {
         layers: policy.layers.clone(),
         dueling: policy.dueling,
@@ -39,9 +39,9 @@ fn file(policy: &Policy, space: &Space, space_path: &str, digest: String) -> Fil
         claims: policy.claims.as_ref().map_or(Vec::new(), fields),
         rules: policy.rules.iter().map(|rule| line(space, rule)).collect(),
     };
-    let headline = "Emitted by `avastra train`; play it with `avastra run --policy FILE`.";
+    let headline = format!("Emitted by `avastra {command}`; play it with `avastra run --policy FILE`.");
     let docs = policy.docs.iter().map(|text| tree::doc(text)).collect();
-    tree::file(headline, space, space_path, docs, ItemKind::Policy(item))
+    tree::file(&headline, space, space_path, docs, ItemKind::Policy(item))
 }
 
 /// `when ego_speed > 8.25 m/s and time == Night => pedestrian(from: Left)`.

@@ -52,6 +52,6 @@ pub(crate) use settings::{agent_named, check_episodes};
 pub use settled::{Numbered, Units, WrittenScenario};
 pub use shard::{SHARDS_MAX, Shard};
 pub use stage::Stage;
-pub use stepped::{StepError, Stepped};
+pub use stepped::{Chosen, Measures, StepError, Stepped};
 pub use summary::{EpisodeSummary, Finding};
 pub use threads::on_threads;

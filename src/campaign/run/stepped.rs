@@ -4,12 +4,17 @@
 //! does not hold for agents that also choose the values of a row (`space-filling` and the searches), nor for policies
 //! with a different observation period.
 
+use std::sync::Arc;
+
 use ndarray::Array1;
 
 use crate::episode::{Choice, Collision, End, EpisodeLog, Moment, Play, Setup, StepLog};
+use avastra_base::geometry::smaller;
+use avastra_lang::model::{Domain, Value};
 use avastra_search::mdp;
-use avastra_search::mdp::{Observation, RewardSettings, StepOutcome};
+use avastra_search::mdp::{Criticality, Observation, RewardSettings, StepOutcome};
 use avastra_world::action::Offer;
+use avastra_world::sim::World;
 
 use crate::run::arena::legal;
 use crate::run::summary::{EpisodeSummary, Finding};
@@ -24,6 +29,43 @@ pub struct Stepped {
     end: Option<End>,
     /// The collisions that were judged already, the first of all.
     findings: Vec<Finding>,
+    measures: Vec<Measures>,
+}
+
+/// How near the ego vehicle came to others in a step. Road users that it had touched before do not count.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Measures {
+    /// Least distance between the outlines, m; `None` if nobody was there.
+    pub distance_m: Option<f64>,
+    pub criticality: Criticality,
+}
+
+impl Measures {
+    fn note(&mut self, world: &World, is_hit: &dyn Fn(u32) -> bool) {
+        self.criticality.note(world, is_hit);
+        let others = world
+            .obstacles()
+            .filter(|other| !other.is_apart && !is_hit(other.id))
+            .map(|other| other.distance_m);
+        self.distance_m = others.chain(self.distance_m).reduce(smaller);
+    }
+
+    /// Of two periods together.
+    #[must_use]
+    pub fn and(&self, other: &Measures) -> Measures {
+        Measures {
+            distance_m: [self.distance_m, other.distance_m].into_iter().flatten().reduce(smaller),
+            criticality: self.criticality.and(&other.criticality),
+        }
+    }
+}
+
+/// A row to carry out in a step, with values for some of what it draws.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chosen {
+    pub row: usize,
+    /// By the names of parameters, SI. Each is moved to the nearest legal one, where the others allow it; what is not given is drawn.
+    pub values: Vec<(Arc<str>, Value)>,
 }
 
 /// Why a step is not possible.
@@ -33,6 +75,10 @@ pub enum StepError {
     Over { end: &'static str },
     #[error("no row {row}: the table has rows 0 to {last}")]
     Row { row: usize, last: usize },
+    #[error("`{action}` draws no `{name}`; `Space.draws` lists what a row draws")]
+    NoDraw { action: String, name: String },
+    #[error("that is no value of `{name}`; `Space.draws` lists them")]
+    NoValue { name: String },
 }
 
 impl Stepped {
@@ -40,8 +86,8 @@ impl Stepped {
     pub fn new(setup: &Setup) -> Stepped {
         let play = Play::new(setup);
         let observation = play.observation();
-        let (offers, findings) = (Vec::new(), Vec::new());
-        let mut begun = Stepped { play, observation, offers, end: None, findings };
+        let (offers, findings, measures) = (Vec::new(), Vec::new(), Vec::new());
+        let mut begun = Stepped { play, observation, offers, end: None, findings, measures };
         begun.look();
         begun
     }
@@ -70,6 +116,16 @@ impl Stepped {
         self.play.steps()
     }
 
+    /// How near it came to others, for each step so far.
+    pub fn measures(&self) -> &[Measures] {
+        &self.measures
+    }
+
+    /// The setup of the episode.
+    pub fn setup(&self) -> &Setup {
+        self.play.setup()
+    }
+
     /// The collisions so far.
     pub fn collisions(&self) -> &[Collision] {
         self.play.collisions()
@@ -88,10 +144,95 @@ impl Stepped {
             Some(row) => Choice::of(row, offers.swap_remove(row)),
             None => Choice::Pass,
         };
-        let observation = std::mem::replace(&mut self.observation, Observation::zeros());
-        self.end = self.play.step(observation, choice, &mut |_, _, _| {});
+        self.drive(choice, &mut |_| {});
         self.look();
         Ok(())
+    }
+
+    /// As [`Stepped::step`], with values of the caller.
+    ///
+    /// # Errors
+    /// As there, and if the row draws no such value, or a value that is no number is none of its choices.
+    pub fn step_with(&mut self, chosen: &Chosen) -> Result<(), StepError> {
+        let choice = self.choice(chosen)?;
+        self.drive(choice, &mut |_| {});
+        self.look();
+        Ok(())
+    }
+
+    /// Carries out one choice in each step, and then none until the episode ends; `watch` sees every tick. It is faster than single
+    /// steps, because nobody asks what is legal. Where a row is refused, the step's log says why.
+    ///
+    /// # Errors
+    /// As [`Stepped::step_with`].
+    pub fn to_the_end(
+        &mut self,
+        chosen: &[Option<Chosen>],
+        watch: &mut dyn FnMut(&World),
+    ) -> Result<(), StepError> {
+        for chosen in chosen.iter().map(Option::as_ref).chain(std::iter::repeat(None)) {
+            if self.end.is_some() {
+                return Ok(());
+            }
+            let choice = chosen.map_or(Ok(Choice::Pass), |chosen| self.choice(chosen))?;
+            self.drive(choice, watch);
+            if self.end.is_none() {
+                match self.play.look() {
+                    Ok(observation) => self.observation = observation,
+                    Err(end) => self.end = Some(end),
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The choice of a row with values of the caller.
+    fn choice(&self, Chosen { row, values }: &Chosen) -> Result<Choice, StepError> {
+        self.can_step(Some(*row))?;
+        let table = &self.play.setup().table;
+        let action = &table.space().actions[table.rows()[*row].action];
+        for (name, value) in values {
+            let Some(parameter) = action.drawn().find(|parameter| parameter.name == *name) else {
+                let (action, name) = (action.name.clone(), name.to_string());
+                return Err(StepError::NoDraw { action, name });
+            };
+            let is_number = matches!(parameter.domain, Domain::Range(..));
+            if !is_number && !parameter.domain.holds(*value) {
+                return Err(StepError::NoValue { name: name.to_string() });
+            }
+        }
+        let judged = |moment: &Moment| {
+            let drawn = table.offer(moment.situation, *row)?;
+            if values.is_empty() {
+                return Ok(drawn);
+            }
+            let given =
+                |name: &Arc<str>| values.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
+            let wanted: Vec<(Arc<str>, Value)> = drawn
+                .values
+                .iter()
+                .map(|(name, value)| (name.clone(), given(name).unwrap_or(*value)))
+                .collect();
+            table
+                .nearest(moment.situation, *row, &wanted)
+                .map_err(|refusals| refusals.into_iter().next().expect("a refusal has a reason"))
+        };
+        Ok(Choice::of(*row, self.play.at(&self.observation, judged)))
+    }
+
+    /// Drives for one observation period.
+    fn drive(&mut self, choice: Choice, watch: &mut dyn FnMut(&World)) {
+        let observation = std::mem::replace(&mut self.observation, Observation::zeros());
+        let mut hit: Vec<u32> =
+            self.collisions().iter().map(|collision| collision.contact.obstacle).collect();
+        let mut measures = Measures::default();
+        self.end = self.play.step(observation, choice, &mut |world, _, contacts| {
+            // The tick of a contact is its nearest.
+            measures.note(world, &|id| hit.contains(&id));
+            hit.extend(contacts.iter().map(|contact| contact.obstacle));
+            watch(world);
+        });
+        self.measures.push(measures);
     }
 
     /// Whether [`Stepped::step`] takes that row now.

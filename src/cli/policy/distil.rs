@@ -44,7 +44,11 @@ pub fn distil(output: &Output, arguments: &DistilArguments) -> Result<(), Failur
     drop(working);
     let folder = path.parent().map_or(PathBuf::new(), PathBuf::from);
     let space_path = load::relative(&folder, &table.space().path)?;
-    write_result(arguments.output.as_ref(), &path, &emit::policy_text(&policy, table.space(), &space_path))?;
+    write_result(
+        arguments.output.as_ref(),
+        &path,
+        &emit::policy_text(&policy, table.space(), &space_path, "train"),
+    )?;
     let claims = policy.claims.as_ref();
     if let Some((claims, rules)) = claims.and_then(|claims| Some((claims, claims.rules.as_ref()?))) {
         output.say(&rules_text(policy.rules.len(), claims.return_mean, rules));

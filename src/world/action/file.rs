@@ -201,7 +201,8 @@ impl ActionTable {
         }
     }
 
-    fn draws(&self, row: &Row, road: usize) -> Vec<DrawRecord> {
+    /// What a row draws on the nth road, and within which bounds by the default rules.
+    pub fn draws(&self, row: &Row, road: usize) -> Vec<DrawRecord> {
         let Reach::Open(ranges) = &row.roads[road] else { return Vec::new() };
         let drawn = self.space().actions[row.action].drawn();
         drawn
