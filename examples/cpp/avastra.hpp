@@ -608,6 +608,10 @@ struct Object {
     double visible = 1.0;
     /// `hazard`, `left`, `right` or `flash`.
     std::optional<std::string> lights;
+    /// Acceleration in the map frame, m/s²; turn, rad/s; time since it is known, s. Only if `Ready::wants` has `motion`.
+    std::optional<double> ax, ay, yaw_rate, age;
+    /// Its number in scenarios and reports, for logs. Only if `Ready::wants` has `names`.
+    std::optional<std::int64_t> npc;
 
     /// m/s, at least 0.
     double speed() const { return std::hypot(vx, vy); }
@@ -704,6 +708,8 @@ struct Ready {
     std::string answer;
     /// Whether the same reset and steps lead to the same answers.
     bool deterministic = true;
+    /// Groups of fields that are sent beside the others: `motion`, `conflicts`, `names`.
+    std::vector<std::string> wants = {};
 };
 
 /// A driving system under test. Derive from it, write `step`, and hand an object of it to `serve`.
@@ -894,6 +900,7 @@ inline void fields(Fields& field, Object& into) {
     field("id", into.id), field("class", into.kind), field("x", into.x), field("y", into.y), field("heading", into.heading);
     field("vx", into.vx), field("vy", into.vy), field("length", into.length), field("width", into.width);
     field("height", into.height), field("visible", into.visible), field("lights", into.lights);
+    field("ax", into.ax), field("ay", into.ay), field("yaw_rate", into.yaw_rate), field("age", into.age), field("npc", into.npc);
 }
 
 template <class T>
@@ -1478,7 +1485,12 @@ private:
         }
         std::string text = "{\"type\":\"ready\",\"protocol\":\"" + std::string(protocol) + "\",\"name\":";
         json::append(text, std::string_view(self.name)), text += ",\"version\":", json::append(text, std::string_view(self.version));
-        return text + ",\"answer\":\"" + self.answer + "\",\"deterministic\":" + (self.deterministic ? "true}" : "false}");
+        text += ",\"answer\":\"" + self.answer + "\",\"deterministic\":" + (self.deterministic ? "true" : "false");
+        for (std::size_t index = 0; index < self.wants.size(); ++index) {
+            text += index == 0 ? ",\"wants\":[" : ",";
+            json::append(text, std::string_view(self.wants[index]));
+        }
+        return text + (self.wants.empty() ? "}" : "]}");
     }
 
     std::string step(const json::Value& message, const detail::Where& where) {

@@ -99,8 +99,8 @@ class Draw:
 #: A value of a draw: a number in SI, a truth value, or the word of a choice.
 Drawn = Union[float, bool, str]
 
-#: A step of `Episodes.evaluate`: a row, a row and values for some of what it draws, or `None`.
-Chosen = Union[int, Tuple[int, Mapping[str, Drawn]], None]
+#: A step of `Episodes.evaluate`: a row, a row and values for some of what it draws, what a result says of a step, or `None`.
+Chosen = Union[int, Tuple[int, Mapping[str, Drawn]], Carried, None]
 
 class Measures(TypedDict):
     """How near the ego vehicle came to others. Those that it had touched before do not count."""
@@ -189,7 +189,7 @@ class Ended(TypedDict):
     #: Smallest margin of each requirement in force, SI; `None` of one that was never asked for, or that has none.
     margins: Dict[str, Optional[float]]
     measures: Measures
-    #: What was carried out, one entry for each step: `Episodes.evaluate` plays it again.
+    #: What was carried out, one entry for each step. `Episodes.evaluate` takes this list, too.
     steps: List[Carried]
 
 class Evaluated(Ended, total=False):
@@ -276,7 +276,8 @@ class Episodes:
         """Plays the whole episode of a seed: one entry of `steps` in each step, and then nothing until it ends.
 
         This is for searches: nothing is compiled, and nobody asks what is legal. It is then the episode under way, so `save`
-        writes it. To play several at once, give each thread a `sibling()`. Raises as `step` does.
+        writes it. To play several at once, give each thread a `sibling()`. Raises `ValueError` or `TypeError` for a row, a name or
+        a value that there is not.
         """
 
     def save(self, path: _Path, *, repeat: int = 0) -> None:

@@ -1,6 +1,6 @@
 """What you write: a class with a method `step`."""
 
-from typing import ClassVar
+from typing import ClassVar, Sequence
 
 from .messages import Answer, Event, Init, Map, Reset, Step
 
@@ -20,6 +20,8 @@ class Driver:
     answer: ClassVar[str] = "control"
     #: Whether the same `reset` and steps lead to the same answers.
     deterministic: ClassVar[bool] = True
+    #: Groups of fields that are sent beside the others: "motion", "conflicts", "names".
+    wants: ClassVar[Sequence[str]] = ()
 
     def init(self, init: Init) -> None:
         """The vehicle and the rates; once, before anything else."""

@@ -26,9 +26,10 @@ Needs `gymnasium>=1.2.2,<2`: `pip install './python[gym]'`.
 """
 
 import copy
+import functools
 import operator
 import os
-from typing import Any, Dict, List, Literal, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, List, Literal, Mapping, Optional, Sequence, Tuple, Union
 
 import gymnasium
 import numpy as np
@@ -37,8 +38,9 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
+from .driver import Driver
 from .engine import EpisodeError, Episodes, Space, step_all, variables
-from .serve import listen
+from .serve import Listener, listen
 
 __all__ = ["Env", "VectorEnv"]
 
@@ -317,10 +319,18 @@ def _compiled(space: "Union[str, os.PathLike[str], Space]") -> Space:
 def _episodes(space: Space, road: Optional[str], observation: _Seen, reward: _Reward,
               conditions: Dict[str, Any]) -> Episodes:
     ads = conditions.get("ads")
+    if isinstance(ads, Driver):
+        raise TypeError("`ads` is the class of a driver, not an object of it: each episode makes its own")
     if callable(ads):
         conditions = {name: value for name, value in conditions.items() if name != "ads"}
-        conditions["ads_cmd"] = listen(ads).address
+        conditions["ads_cmd"] = _listener(ads).address
     return Episodes(space, road or space.roads[0], observation=observation, reward=reward, **conditions)
+
+
+@functools.lru_cache(maxsize=None)
+def _listener(driver: Callable[[], Driver]) -> Listener:
+    # One for each class, as long as this process lives: environments begin anew after `close`.
+    return listen(driver)
 
 
 def _mode(mode: Union[str, AutoresetMode]) -> AutoresetMode:

@@ -205,6 +205,17 @@ class RoutePoint(NamedTuple):
 
 
 @dataclass(frozen=True)
+class Conflict:
+    """A crossing of the route with another lane, at `route_s` and at `s` of that lane."""
+
+    route_s: float
+    lane: str
+    s: float
+    #: Heading of that lane minus that of the route, rad; positive comes from the right.
+    angle: float
+
+
+@dataclass(frozen=True)
 class Route:
     """The way to the goal. `path` has a point every `spacing` m from station 0, lane changes included."""
 
@@ -216,6 +227,8 @@ class Route:
     stop_lines: List[RouteStopLine]
     signs: List[RouteSign]
     crosswalks: List[Tuple[float, float]]
+    #: Where the path crosses other lanes inside junctions; only if `Driver.wants` has "conflicts".
+    conflicts: Optional[List[Conflict]] = None
 
 
 @dataclass(frozen=True)
@@ -227,6 +240,8 @@ class Reset:
     start: Start
     goal: Goal
     route: Route
+    #: The seed in full, as scenarios have it; only if `Driver.wants` has "names".
+    episode_seed: Optional[str] = None
 
 
 @dataclass(frozen=True)
@@ -270,6 +285,13 @@ class Object:
     visible: float
     #: hazard, left, right or flash; None of one that shows nothing.
     lights: Optional[str] = None
+    #: Acceleration in the map frame, m/s²; turn, rad/s; time since it is known, s. Only if `Driver.wants` has "motion".
+    ax: Optional[float] = None
+    ay: Optional[float] = None
+    yaw_rate: Optional[float] = None
+    age: Optional[float] = None
+    #: Its number in scenarios and reports, for your logs; None of a ghost. Only if `Driver.wants` has "names".
+    npc: Optional[int] = None
 
     @property
     def speed(self) -> float:

@@ -9,6 +9,7 @@
 Needs `stable-baselines3>=2.4,<3` and `gymnasium`. What a row, a step and a reward are, `avastra.gym` says.
 """
 
+import functools
 import os
 from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple, Type, Union
 
@@ -45,6 +46,8 @@ class VecEnv(_VecEnv):
         roads = [road] if road is None or isinstance(road, str) else list(road)
         if num_envs < 1 or not roads:
             raise ValueError("a vector environment has at least one world and one road")
+        if settings.get("mask", "info") != "info":
+            raise ValueError("masks are in the infos and in `action_masks`: leave `mask` out")
         compiled = space if isinstance(space, Space) else Space(space)
         first = [Env(compiled, name, **settings) for name in roads[:num_envs]]
         self._first = first
@@ -78,7 +81,9 @@ class VecEnv(_VecEnv):
             infos[world]["terminal_observation"] = observations[world].copy()
             infos[world]["TimeLimit.truncated"] = ends[world] != "arrived"
         if over:
-            observations[over], _ = self._begin(over, [draw_seed(self._generators[world]) for world in over])
+            observations[over], begun = self._begin(over, [draw_seed(self._generators[world]) for world in over])
+            for world, info in zip(over, begun):
+                self.reset_infos[world] = info
         return observations, rewards.astype(np.float32), np.array([end is not None for end in ends]), infos
 
     def action_masks(self) -> np.ndarray:
@@ -93,18 +98,25 @@ class VecEnv(_VecEnv):
             env.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> List[Any]:
-        return [getattr(self._first[0], attr_name) for _ in self._get_indices(indices)]
+        if attr_name == "action_masks":
+            return [functools.partial(self._masks_of, world) for world in self._get_indices(indices)]
+        if attr_name == "episodes":
+            return [self.worlds[world] for world in self._get_indices(indices)]
+        return [getattr(self._first[world % len(self._first)], attr_name) for world in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         raise AttributeError(f"worlds share their settings: make another VecEnv to set `{attr_name}`")
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> List[Any]:
         if method_name == "action_masks":
-            return [self._legal[world].copy() for world in self._get_indices(indices)]
+            return [self._masks_of(world) for world in self._get_indices(indices)]
         raise AttributeError(f"a world has no method `{method_name}`")
 
     def env_is_wrapped(self, wrapper_class: Type[Any], indices: Any = None) -> List[bool]:
         return [False for _ in self._get_indices(indices)]
+
+    def _masks_of(self, world: int) -> np.ndarray:
+        return np.array(self._legal[world])
 
     def _begin(self, worlds: Iterable[int], seeds: Sequence[int]) -> "Tuple[np.ndarray, List[Dict[str, Any]]]":
         which = list(worlds)

@@ -10,6 +10,7 @@ import os
 import socket
 import sys
 import threading
+import time
 import traceback
 from typing import IO, Any, Callable, Dict, Iterable, Optional, Union
 
@@ -48,15 +49,19 @@ class Listener:
     def __init__(self, driver: Callable[[], Driver]) -> None:
         self._driver = driver
         self._socket = socket.create_server(("127.0.0.1", 0))
+        self._is_closed = False
+        #: As `--ads` and `ads_cmd` take it: `tcp:127.0.0.1:PORT`.
+        self.address = f"tcp:127.0.0.1:{self._socket.getsockname()[1]}"
         threading.Thread(target=self._accept, name="avastra.listen", daemon=True).start()
 
-    @property
-    def address(self) -> str:
-        """As `--ads` and `ads_cmd` take it: `tcp:127.0.0.1:PORT`."""
-        return f"tcp:127.0.0.1:{self._socket.getsockname()[1]}"
-
     def close(self) -> None:
-        """Takes no further connection."""
+        """Takes no further connection; those that there are go on."""
+        self._is_closed = True
+        # Closing alone does not wake a thread that waits for a connection.
+        try:
+            self._socket.shutdown(socket.SHUT_RDWR)
+        except OSError:
+            pass
         self._socket.close()
 
     def __enter__(self) -> "Listener":
@@ -69,8 +74,11 @@ class Listener:
         while True:
             try:
                 connection, _ = self._socket.accept()
-            except OSError:  # closed
-                return
+            except OSError:
+                if self._is_closed:
+                    return
+                time.sleep(0.01)
+                continue
             threading.Thread(target=self._converse, args=(connection,), daemon=True).start()
 
     def _converse(self, connection: socket.socket) -> None:
@@ -158,7 +166,7 @@ class Conversation:
             raise ProtocolError(f"asked for answers of kind `{init.answer}`, and gives only `{driver.answer}`")
         driver.init(init)
         self.initialised = True
-        return {
+        ready = {
             "type": "ready",
             "protocol": PROTOCOL,
             "name": driver.name or type(driver).__name__,
@@ -166,6 +174,7 @@ class Conversation:
             "answer": driver.answer,
             "deterministic": driver.deterministic,
         }
+        return {**ready, "wants": list(driver.wants)} if driver.wants else ready
 
     def _checked(self, answer: Dict[str, Any], step: Step) -> Dict[str, Any]:
         """The answer, if it is of the announced kind and a trajectory covers its time."""

@@ -35,7 +35,8 @@ class Danger(Fitness):
     name, min_or_max = ("time to collision", "braking that is needed"), ("min", "max")
 
     def eval(self, output):
-        return output.otherParams["measures"]["ttc_s"] or 8.0, output.otherParams["measures"]["required_mps2"]
+        ttc_s, needed = (output.otherParams["measures"][name] for name in ("ttc_s", "required_mps2"))
+        return -output.otherParams["counted"] or (8.0 if ttc_s is None else ttc_s), needed
 
 
 class Near(Critical):

@@ -30,7 +30,8 @@ def chosen(trial):
 def nearness(trial):
     """Least time to collision, s; less than 0 for a collision that counts."""
     played = episodes.evaluate(1, chosen(trial))
-    return -played["counted"] or played["measures"]["ttc_s"] or 8.0
+    ttc_s = played["measures"]["ttc_s"]
+    return -played["counted"] or (8.0 if ttc_s is None else ttc_s)
 
 
 optuna.logging.set_verbosity(optuna.logging.WARNING)

@@ -35,7 +35,7 @@ scheduler = Scheduler(archive, [EvolutionStrategyEmitter(archive, x0=[0.5] * 40,
 began = time.perf_counter()
 for _ in range(int(count) // 25):
     played = [episodes.evaluate(1, steps_of(shares)) for shares in scheduler.ask()]
-    near = [one["measures"]["ttc_s"] or 8.0 for one in played]
+    near = [8.0 if one["measures"]["ttc_s"] is None else one["measures"]["ttc_s"] for one in played]
     scheduler.tell([one["counted"] or -ttc_s for one, ttc_s in zip(played, near)],
                    [[one["distance_m"], one["measures"]["required_mps2"]] for one in played])
 best = archive.best_elite

@@ -24,7 +24,7 @@ network = [layer for layer in model.q_net.q_net if hasattr(layer, "weight")]
 layers = [(layer.weight.detach().cpu().numpy(), layer.bias.detach().cpu().numpy()) for layer in network]
 episodes = env.worlds[0]
 episodes.save_policy(f"{name}_policy.ava", layers, by=f"stable-baselines3 {stable_baselines3.__version__}, DQN", seed=1,
-                     masked=False)
+                     episodes=int(steps) // 20, masked=False)
 
 # Twenty episodes with the learned network; the last one that crashes is kept.
 counted, kept = 0, None
@@ -37,7 +37,7 @@ for number in range(20):
     counted += info["ended"]["counted"]
     print(seed, info["ended"]["trace"])
     if info["ended"]["counted"]:
-        kept = seed, [(step["row"], step["values"]) if step["row"] >= 0 else None for step in info["ended"]["steps"]]
+        kept = seed, info["ended"]["steps"]
 print(f"{counted} counted collisions in 20 episodes")
 if kept:
     episodes.evaluate(*kept)

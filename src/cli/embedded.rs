@@ -21,6 +21,15 @@ use super::load;
 use super::run_directory::Player;
 use super::train::origin;
 
+/// The largest number of a network in a file of the language.
+const WEIGHT_MAX: f32 = 10_000.0;
+
+/// How every emitted file begins.
+const EMITTED: &str = "//! Emitted by `avastra ";
+
+/// What emits files here, as their first line names it.
+const PYTHON: &str = "(Python)";
+
 /// A space that was read, and what there is to say of it.
 pub struct Compiled {
     pub table: ActionTable,
@@ -90,8 +99,8 @@ pub fn save(run: &Run, setup: &Setup, log: &EpisodeLog, path: &Path, replays: u3
     summary.find_keepers(setup, log);
     summary.find_recurrence(setup, &Script::of_log(log), log, replays);
     let conditions = &run.settings().conditions;
-    let player = Player { command: "Episodes.save", table: run.table(), agent: "python", conditions };
-    player.write_named(path, (log, &summary)).map_err(|error| error.to_string())
+    let player = Player { command: PYTHON, table: run.table(), agent: "python", conditions };
+    player.write_named(&resolved(path), (log, &summary)).map_err(|error| error.to_string())
 }
 
 /// A network that another program trained on the scaled observation.
@@ -143,7 +152,10 @@ pub fn save_policy(run: &Run, path: &Path, trained: &Trained) -> Result<(), Stri
     let fits = |(index, layer): (usize, &Layer)| {
         layer.inputs == given[index] && layer.weights.len() == layer.inputs * layer.biases.len()
     };
-    if given != wanted.layers || !trained.layers.iter().enumerate().all(fits) {
+    if let Some(number) = trained.layers.iter().enumerate().position(|layer| !fits(layer)) {
+        return Err(format!("the weights of layer {number} do not fit its inputs or its biases"));
+    }
+    if given != wanted.layers {
         return Err(format!(
             "the network has {} units; here it needs {}: the scaled observation, hidden layers, and one output for each row",
             widths(&given),
@@ -156,13 +168,13 @@ pub fn save_policy(run: &Run, path: &Path, trained: &Trained) -> Result<(), Stri
         (0..*inputs).flat_map(of_input).chain(biases.iter().copied()).collect::<Vec<f32>>()
     };
     let parameters: Vec<f32> = trained.layers.iter().flat_map(ours).collect();
-    if !parameters.iter().all(|parameter| parameter.is_finite()) {
-        return Err("a weight is not finite".to_owned());
+    if !parameters.iter().all(|parameter| parameter.abs() <= WEIGHT_MAX) {
+        return Err(format!("a weight is not finite, or beyond {WEIGHT_MAX}"));
     }
     let Trained { by, seed, episodes, .. } = trained;
     let conditions = &run.settings().conditions;
     let policy = Policy {
-        name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        name: emit::identifier(&path.file_stem().unwrap_or_default().to_string_lossy()),
         docs: vec![format!("{by}, trained elsewhere; nothing was evaluated.")],
         origin: origin(conditions, run.arena().attached().as_ref(), by, (*seed, *episodes)),
         layers: wanted.layers,
@@ -173,17 +185,35 @@ pub fn save_policy(run: &Run, path: &Path, trained: &Trained) -> Result<(), Stri
         rules: Vec::new(),
         digest: String::new(),
     };
+    QPolicy::read(&policy, table).map_err(|error| error.to_string())?;
+    let path = &resolved(path);
     let folder = path.parent().unwrap_or(Path::new("."));
     let space = table.space();
     let relative = load::relative(folder, &space.path).map_err(|error| error.to_string())?;
-    let text = emit::policy_text(&policy, space, &relative, "Episodes.save_policy");
+    let text = emit::policy_text(&policy, space, &relative, PYTHON);
     write_named(path, &text).map_err(|error| error.to_string())
+}
+
+/// Where a file really lies, if it is a link: what it names is relative to there.
+fn resolved(path: &Path) -> PathBuf {
+    std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
 }
 
 /// Whether a file may be written there that names the space's file.
 fn is_named_and_there(space: &Space, path: &Path) -> Result<(), String> {
     if path.extension().is_none_or(|extension| extension != "ava") {
         return Err(format!("`{}` is no name of a file of the language: end it with `.ava`", path.shown()));
+    }
+    // Only what was emitted is replaced: not a space, nor a file that it uses.
+    let is_foreign = |text: String| !text.starts_with(EMITTED);
+    if path.exists() && load::text(path).map_or(true, is_foreign) {
+        return Err(format!("`{}` is there, and avastra did not emit it: name another file", path.shown()));
+    }
+    if !space.path.exists() {
+        return Err(format!(
+            "`{}` is not there: what is saved names the file of its space; a relative path begins at the working directory",
+            space.path.shown()
+        ));
     }
     // What is written names the file of its space.
     let there = compile(&space.path).ok().map(|there| there.table.space().meaning.seal());

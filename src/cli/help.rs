@@ -148,7 +148,8 @@ const MOVED: &[(&str, &str)] = &[
     ("--ads-cmd", "--ads 'COMMAND'"),
     ("--compare", "--ads DRIVER"),
     ("--replays", "--repeat N"),
-    ("--likelihood", "diagnose --moment"),
+    ("--likelihood", "diagnose --moment, which asks how far chance has a part"),
+    ("--mechanisms", "diagnose FILES, which lists each weakness"),
     ("--fail-on-collision", "--fail-on collision"),
     ("--fail-on-breach", "--fail-on breach"),
 ];

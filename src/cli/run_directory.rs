@@ -666,7 +666,8 @@ impl Player<'_> {
         let (folder, name) = (path.parent().unwrap_or(Path::new(".")), path.file_stem().unwrap_or_default());
         let space_path = load::relative(folder, &self.table.space().path)?;
         let Player { command, agent, conditions: Conditions { without, with, .. }, .. } = *self;
-        let (name, space_path) = (&*name.to_string_lossy(), space_path.as_str());
+        let name = emit::identifier(&name.to_string_lossy());
+        let (name, space_path) = (name.as_str(), space_path.as_str());
         let source = emit::Provenance { command, name, space_path, episode, agent, without, with };
         Ok(print(&emitted(&source)))
     }

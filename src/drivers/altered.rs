@@ -32,7 +32,7 @@ pub enum Alteration {
     Standing,
     /// It is told that every light shows this.
     Lights(SignalColour),
-    /// It is told what will be so long after, s, if everybody keeps speed and turn. It makes up for a delay.
+    /// It is told what will be so long after, s, if others go straight on and it keeps its own turn. It makes up for a delay.
     Ahead(f64),
     /// It is told of others and of lights what was so long before, s.
     Late(f64),
@@ -44,7 +44,7 @@ pub enum Alteration {
     Mirrored,
     /// It is told of a road user that is not there, always at the same place.
     Phantom(SensedObject),
-    /// Its commands are carried out so long after, s.
+    /// Its commands are carried out so long after, s; until then, the first one holds.
     Delayed(f64),
     /// The brake acts this many times as strongly as it asks, as far as the vehicle can.
     Braking(f64),

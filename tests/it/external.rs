@@ -742,3 +742,64 @@ fn mistakes_in_a_profile_are_told_where_they_are() {
     let causes = ["run", SPACE, "--causes", "--ads", &config];
     fails(&causes, "`toy 1` is not made of modules");
 }
+
+#[test]
+fn a_program_gets_the_fields_that_it_wants_and_is_asked_what_its_failure_hangs_on() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let path = |name: &str| scratch.path().join(name).display().to_string();
+    let program = cargo_bin("avastra").display().to_string();
+    let command = format!(
+        "'{program}' ads toy --answer trajectory --blind --wants motion --wants conflicts --wants names --wants later"
+    );
+    let run =
+        ["run", SPACE, "--road", "corner", "--episodes", "2", "--seed", "1", "--jobs", "1", "--repeat", "0"];
+    done(&[&run[..], &["--ads", &command, "--out", &path("run")]].concat());
+    let files = texts(scratch.path().join("run/critical"));
+    let (name, text) = files.iter().find(|(name, _)| name.ends_with(".ava")).expect("it crashes");
+    let file = path(&format!("run/critical/{name}"));
+    done(&["replay", &file, "--record", &path("told.jsonl")]);
+    let told = std::fs::read_to_string(path("told.jsonl")).expect("it is written");
+    let told: Vec<Value> = told.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let reset = &told[1]["question"];
+    let seed = reset["episode_seed"].as_str().expect("its seed");
+    assert!(text.contains(&format!("seed: {seed}")), "{text}");
+    let conflicts = reset["route"]["conflicts"].as_array().expect("a list");
+    assert!(conflicts.iter().all(|conflict| conflict["lane"].is_string()), "{reset}");
+    let mut ages = 0;
+    for line in &told[2..] {
+        for object in line["question"]["objects"].as_array().expect("a list") {
+            let number = |field: &str| object[field].as_f64().unwrap_or_else(|| panic!("{field}: {object}"));
+            assert!(number("ax").is_finite() && number("yaw_rate").is_finite() && number("age") >= 0.0);
+            ages += u32::from(number("age") > 1.0);
+            assert_eq!(line["npcs"][object["id"].to_string()], object["npc"]);
+        }
+    }
+    assert!(ages > 0, "nobody was known for a second");
+
+    let (status, told, _) =
+        outcome(&mut avastra(&["diagnose", &file, "--ads", &command, "--format", "json"]));
+    let told: Value = serde_json::from_str(told.lines().next().expect("a line")).expect("JSON");
+    let swaps = &told["scenarios"][0]["swaps"];
+    assert_eq!((status, &swaps["response"]["late_s"]), (0, &Value::Null), "{told}");
+    assert!(
+        ["ignored_road_user", "ignored_lights"].iter().any(|named| swaps["hangs_on"] == *named),
+        "{told}"
+    );
+    let found = |change: &str| {
+        let swaps = swaps["swaps"].as_array().expect("a list");
+        swaps
+            .iter()
+            .find(|swap| swap["change"] == change)
+            .unwrap_or_else(|| panic!("{change}: {told}"))
+            .clone()
+    };
+    // It sees nothing, but it is shown where it is: by the truth it drives otherwise.
+    assert_eq!(
+        (&found("without_all")["differs_s"], &found("without_all")["fate"]),
+        (&Value::Null, &"same".into())
+    );
+    assert!(found("truth")["differs_s"].is_f64(), "{told}");
+    // Without the program, nothing can be changed.
+    let (status, _, said) = outcome(&mut avastra(&["diagnose", &file]));
+    assert!(status == 1 && said.contains("which must drive each change"), "{said}");
+}

@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use crate::cases::{copy_space, entries, name, root};
+use crate::cases::{copy_space, entries, files, name, root};
 use crate::command::{avastra, done, fails, outcome};
 use crate::world::FLICKER;
 
@@ -50,6 +50,22 @@ impl Found {
             outcome(&mut avastra(&[&["test", "--format", "json"], arguments].concat()));
         let line = stdout.lines().next().unwrap_or_else(|| panic!("{stderr}"));
         (status, serde_json::from_str(line).expect("it is JSON"), stderr)
+    }
+}
+
+/// Failures of driving systems that others wrote, from their recorded answers alone. `sh python/adapters/run.sh NAME …` finds
+/// others, should the engine or the protocol change.
+#[test]
+fn the_failures_of_strangers_replay() {
+    let files = files(root().join("scenarios/strangers"), "ava");
+    assert!(files.len() >= 5, "{files:?}");
+    for file in files {
+        let path = file.display().to_string();
+        let told = done(&["replay", &path]);
+        assert!(told.contains("holds, 6 claims confirmed"), "{told}");
+        let text = std::fs::read_to_string(&file).expect("it is shipped");
+        assert!(text.contains("ads: \"external\"") && text.contains("expect avoidable by"), "{path}");
+        assert!(!text.contains("\\\"/"), "{path} names a place on a machine");
     }
 }
 

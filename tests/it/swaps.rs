@@ -175,3 +175,25 @@ fn the_planted_faults_are_named() {
     println!("{named} of {of} named, {right} of them right");
     assert!(named * 10 >= of * 6 && right * 10 >= named * 9, "{named} of {of} named, {right} right");
 }
+
+/// The drivers without a fault fail, too. How often is something named that nobody planted?
+#[test]
+#[ignore = "it plays some 10,000 episodes: a few minutes"]
+fn drivers_without_a_fault_are_told() {
+    for ads in DRIVERS {
+        let mut told = std::collections::BTreeMap::<&str, u32>::new();
+        for space in SPACES {
+            let run = run_against(ads, space_at(space), EPISODES, SEED, &[]);
+            for number in 0..run.episodes() {
+                let setup = run.setup(number);
+                let log = run.played(&setup);
+                if let Some(found) = EpisodeSummary::judged(&setup, number, &log).first_found(&log) {
+                    let swaps = oracle::swaps(&setup, &log, found);
+                    assert!(swaps.found_s >= swaps.from_s);
+                    *told.entry(swaps.hangs_on.map_or("none", HangsOn::name)).or_default() += 1;
+                }
+            }
+        }
+        println!("{ads}: {told:?}");
+    }
+}

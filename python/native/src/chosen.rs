@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use avastra::action::ActionTable;
 use avastra::episode::{EpisodeLog, Outcome, StepLog};
-use avastra::model::{Space, Type, Value};
+use avastra::model::{Domain, Space, Type, Value};
 use avastra::run::{Chosen, Measures};
 use avastra::sim::{FRAME_TICKS, World};
 use numpy::{PyArray1, PyArrayMethods as _};
@@ -12,15 +12,30 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyList, PyTuple};
 
-/// A step as Python gives it: `None`, a row, or a row and a dict of values.
+/// A step as Python gives it: `None`, a row, a row and a dict of values, or a dict as a result has it.
 pub fn chosen(table: &ActionTable, step: &Bound<'_, PyAny>) -> PyResult<Option<Chosen>> {
     if step.is_none() {
         return Ok(None);
     }
-    let (row, given) = match step.cast::<PyTuple>() {
-        Ok(pair) => (pair.get_item(0)?, Some(pair.get_item(1)?)),
-        Err(_) => (step.clone(), None),
+    let (row, given) = if let Ok(pair) = step.cast::<PyTuple>() {
+        if pair.len() != 2 {
+            return Err(PyValueError::new_err(format!(
+                "a step is a row, or a row and a dict of values, not {step}"
+            )));
+        }
+        (pair.get_item(0)?, Some(pair.get_item(1)?))
+    } else if let Ok(pair) = step.cast::<PyList>().map(|list| list.to_tuple()) {
+        return chosen(table, pair.as_any());
+    } else if let Ok(carried) = step.cast::<PyDict>() {
+        let missing = || PyValueError::new_err("a step has `row` and `values`");
+        (carried.get_item("row")?.ok_or_else(missing)?, carried.get_item("values")?)
+    } else {
+        (step.clone(), None)
     };
+    // That a step had no row is told so.
+    if step.is_instance_of::<PyDict>() && row.extract::<i64>().is_ok_and(|row| row == -1) {
+        return Ok(None);
+    }
     let row = whole(table, &row)?;
     let values = given.filter(|given| !given.is_none());
     let values = values.map_or(Ok(Vec::new()), |given| values_of(table, row, given.cast::<PyDict>()?));
@@ -30,6 +45,9 @@ pub fn chosen(table: &ActionTable, step: &Bound<'_, PyAny>) -> PyResult<Option<C
 /// The number of a row.
 pub fn whole(table: &ActionTable, row: &Bound<'_, PyAny>) -> PyResult<usize> {
     let last = table.rows().len() - 1;
+    if row.is_instance_of::<PyBool>() {
+        return Err(PyTypeError::new_err(format!("a row is a whole number, not {row}")));
+    }
     let number: i64 =
         row.extract().map_err(|_| PyTypeError::new_err(format!("a row is a whole number, not {row}")))?;
     let known = usize::try_from(number).ok().filter(|row| *row <= last);
@@ -53,6 +71,15 @@ pub fn values_of(
             return Err(PyValueError::new_err(format!("`{}` draws no `{name}`, but {all}", action.name)));
         };
         let wrong = |wanted: &str| PyTypeError::new_err(format!("`{name}` is {wanted}, not {value}"));
+        // A choice is given as `Space.draws` lists it, too.
+        let listed = value.extract::<String>().ok().and_then(|word| match &parameter.domain {
+            Domain::Values(values) => values.iter().find(|one| space.show_in_si(**one, parameter.ty) == word),
+            Domain::Range(..) => None,
+        });
+        if let Some(listed) = listed {
+            values.push((Arc::clone(&parameter.name), *listed));
+            continue;
+        }
         let value = match parameter.ty {
             Type::Bool => Value::Bool(value.cast::<PyBool>().map_err(|_| wrong("True or False"))?.is_true()),
             Type::Enum(of) => {
@@ -62,6 +89,9 @@ pub fn values_of(
                 Value::Variant(of, variant.ok_or_else(|| wrong(&format!("one of {}", variants.join(", "))))?)
             }
             Type::Int | Type::Quantity(_) => {
+                if value.is_instance_of::<PyBool>() {
+                    return Err(wrong("a number"));
+                }
                 let number: f64 = value.extract().map_err(|_| wrong("a number"))?;
                 if !number.is_finite() {
                     return Err(PyValueError::new_err(format!("`{name}` is {number}: give a finite number")));
@@ -69,6 +99,12 @@ pub fn values_of(
                 Value::Number(number)
             }
         };
+        if let Domain::Values(listed) = &parameter.domain
+            && !listed.contains(&value)
+        {
+            let all: Vec<String> = listed.iter().map(|one| space.show_in_si(*one, parameter.ty)).collect();
+            return Err(PyValueError::new_err(format!("`{name}` is one of {}", all.join(", "))));
+        }
         values.push((Arc::clone(&parameter.name), value));
     }
     Ok(values)

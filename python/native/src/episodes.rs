@@ -8,11 +8,12 @@ use avastra::agent::{Features, LearnerSettings, Settings, by_name};
 use avastra::cli::embedded::{Conditions, Layer, Trained, run, save_policy};
 use avastra::episode::{Collision, EpisodeLog, StepLog};
 use avastra::mdp::{Observation, RewardSettings};
+use avastra::model::REPLAYS_MAX;
 use avastra::model::policy::VARIABLES;
 use avastra::rng::{Stream, child_seed};
 use avastra::run::{Chosen, Finding, Measures, Run, Stepped};
 use avastra::sim::World;
-use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{AllowTypeChange, PyArray1, PyArrayLike1, PyArrayLike2};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -194,6 +195,9 @@ impl Episodes {
         row: Option<i64>,
         values: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<(Array<'py, f32>, f64, Option<&'static str>, Bound<'py, PyDict>)> {
+        if row.is_none() && values.is_some_and(|values| !values.is_empty()) {
+            return Err(PyValueError::new_err("values without a row: name the row that draws them"));
+        }
         let row = self.row(row).map_err(EpisodeError::new_err)?;
         let seen = match (row, values) {
             (Some(row), Some(given)) => {
@@ -249,6 +253,11 @@ impl Episodes {
     /// replaced. The space's file must lie where the space was read from.
     #[pyo3(signature = (path, *, repeat=0))]
     fn save(&self, py: Python<'_>, path: PathBuf, repeat: u32) -> PyResult<()> {
+        if repeat > REPLAYS_MAX {
+            return Err(PyValueError::new_err(format!(
+                "`repeat` is {repeat}: at most {REPLAYS_MAX} replays"
+            )));
+        }
         let save = || {
             let now = self.now().clone().ok_or_else(|| NOT_BEGUN.to_owned())?;
             avastra::cli::embedded::save(&self.run, now.setup(), &now.log(), &path, repeat)
@@ -268,7 +277,7 @@ impl Episodes {
         &self,
         py: Python<'_>,
         path: PathBuf,
-        layers: Vec<(PyReadonlyArray2<'_, f32>, PyReadonlyArray1<'_, f32>)>,
+        layers: Vec<(PyArrayLike2<'_, f32, AllowTypeChange>, PyArrayLike1<'_, f32, AllowTypeChange>)>,
         by: String,
         seed: u64,
         episodes: u64,

@@ -64,6 +64,11 @@ class Values(unittest.TestCase):
         self.assertLessEqual(info["values"]["distance"], 40.0)
         self.assertGreater(info["measures"]["distance_m"], 0.0)
 
+    def test_a_legal_value_stays_as_it_is(self):
+        for seed in range(6):
+            step = self.episodes.evaluate(seed, [[self.row, {"distance": 20.0}]])["steps"][0]
+            self.assertEqual((step["refused"], step["values"]["distance"]), (None, 20.0))
+
     def test_a_wrong_value_is_refused(self):
         for values, error, text in [({"pace": 1.0}, ValueError, "draws no `pace`, but mode, speed"),
                                     ({"speed": "fast"}, TypeError, "a number"), ({"mode": 3}, TypeError, "a word"),
@@ -71,7 +76,7 @@ class Values(unittest.TestCase):
                                     ({"speed": float("nan")}, ValueError, "finite")]:
             with self.subTest(values=values), self.assertRaisesRegex(error, text):
                 self.episodes.evaluate(1, [(self.row, values)])
-        for steps, error in [([1.5], TypeError), ([99], ValueError), ([-1], ValueError), (["0"], TypeError)]:
+        for steps, error in [([(1,)], ValueError), ([(1, {}, 3)], ValueError), ([{}], ValueError), ([1.5], TypeError), ([99], ValueError), ([-1], ValueError), (["0"], TypeError)]:
             with self.subTest(steps=steps), self.assertRaises(error):
                 self.episodes.evaluate(1, steps)
 
@@ -90,8 +95,7 @@ class Values(unittest.TestCase):
         self.assertAlmostEqual(ego[-1, 0], played["duration_s"], delta=0.1)
         self.assertEqual(list(played["trajectory"]["npc"]), [1])
         # What was carried out can be played again.
-        steps = [(step["row"], step["values"]) if step["row"] >= 0 else None for step in played["steps"]]
-        self.assertEqual(self.episodes.evaluate(7, steps)["trace"], played["trace"])
+        self.assertEqual(self.episodes.evaluate(7, played["steps"])["trace"], played["trace"])
 
     def test_margins_and_breaches_are_told(self):
         episodes = avastra.Episodes(avastra.compile(LAW), "crossroad", ads="blind")
@@ -132,9 +136,9 @@ class Files(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "reset first"):
             episodes.save(self.path / "early.ava")
         episodes.evaluate(1)
-        episodes.save(self.path / "found.ava", repeat=7)
-        self.assertIn("holds", self.replayed("replay", self.path / "found.ava"))
-        self.assertIn("It recurs", (self.path / "found.ava").read_text())
+        episodes.save(self.path / "my-crash 2.ava", repeat=7)
+        self.assertIn("holds", self.replayed("replay", self.path / "my-crash 2.ava"))
+        self.assertIn("It recurs", (self.path / "my-crash 2.ava").read_text())
         with self.assertRaisesRegex(ValueError, "end it with `.ava`"):
             episodes.save(self.path / "found.txt")
 
@@ -143,9 +147,20 @@ class Files(unittest.TestCase):
         space = avastra.Space.from_text(text, self.path / "space.ava")
         episodes = avastra.Episodes(space, "corner", ads="idm")
         episodes.evaluate(1)
-        with self.assertRaisesRegex(ValueError, "write its text there first"):
+        with self.assertRaisesRegex(ValueError, "is not there: what is saved"):
             episodes.save(self.path / "found.ava")
         self.assertEqual(os.listdir(self.path), [])
+
+    def test_only_emitted_files_are_replaced(self):
+        own = self.path / "space.ava"
+        own.write_text(SPACE.read_text().replace('use "', f'use "{SPACE.parent}/'))
+        episodes = avastra.Episodes(avastra.compile(own), "corner", ads="idm")
+        episodes.evaluate(1)
+        with self.assertRaisesRegex(ValueError, "did not emit it"):
+            episodes.save(own)
+        for _ in range(2):
+            episodes.save(self.path / "played.ava")
+        self.assertEqual(len(avastra.compile(own).rows), 45)
 
     @unittest.skipUnless(PROGRAM, "needs the program")
     def test_a_network_becomes_a_policy(self):
@@ -199,6 +214,10 @@ class Vectors(unittest.TestCase):
                 self.assertEqual(end is not None, dones[world])
             over = dones.any()
         self.assertEqual(env.env_method("action_masks")[0].shape, (45,))
+        shown = [masks() for masks in env.get_attr("action_masks")]
+        np.testing.assert_array_equal(shown, env.action_masks())
+        with self.assertRaisesRegex(ValueError, "leave `mask` out"):
+            VecEnv(1, SPACE, mask="observation")
         with self.assertRaises(TypeError):
             env.step(np.array([0.5, 1.0, 2.0]))
 

@@ -202,6 +202,11 @@ pub struct Play {
 }
 
 impl Play {
+    /// The world at this moment.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
     /// An episode before its first step.
     pub fn new(setup: &Setup) -> Play {
         let world = World::new(setup.scene.clone(), &setup.start);
@@ -346,8 +351,7 @@ impl Play {
     /// action, and how near a collision was at most.
     fn drive(&mut self, mut begun: Begun, watch: &mut Watch) -> (Outcome, Near) {
         let mut near: Option<Near> = None;
-        let shift = self.setup.period_shifts.get(self.steps.len()).copied().unwrap_or(0);
-        let ticks = (self.setup.table.space().episode.step_s / DT_S).round() as i64 + i64::from(shift);
+        let ticks = (self.setup.table.space().episode.step_s / DT_S).round() as i64;
         for tick in 0..ticks {
             if let Begun::Waiting(waiting) = &mut begun
                 && waiting.is_due(tick, self)
@@ -561,7 +565,6 @@ rule never on dry: ego.speed > 60 m/s
             seed,
             start: Start::drawn(&space, road, &memory, seed),
             memory,
-            period_shifts: Vec::new(),
             proc: ProcKind::default(),
             table: ActionTable::new(space),
         }

@@ -21,9 +21,6 @@ pub struct Setup {
     pub start: Start,
     /// States of the space at the start; those that stand for weather agree with `start`.
     pub memory: Memory,
-    /// Ticks by which each observation period is longer than the space says (negative: shorter); steps beyond the
-    /// list's end are not shifted. Used to ask what a little more or less time would have changed; otherwise empty.
-    pub period_shifts: Vec<i32>,
     /// How collision probabilities are computed.
     pub proc: ProcKind,
 }

@@ -58,6 +58,8 @@ pub enum Fate {
     Vanished,
     /// The obstacle never appeared: the play says nothing.
     Absent,
+    /// An external driving system failed before that: the play says nothing.
+    Failed,
 }
 
 impl Fate {
@@ -68,6 +70,7 @@ impl Fate {
             Fate::Other => "another crash".to_owned(),
             Fate::Vanished => format!("no {noun}"),
             Fate::Absent => "never met".to_owned(),
+            Fate::Failed => "it failed".to_owned(),
         }
     }
 }
@@ -207,6 +210,8 @@ impl<'a> Case<'a> {
         };
         if is_same {
             Fate::Same
+        } else if log.failure.is_some() {
+            Fate::Failed
         } else if log.collisions.iter().any(|collision| at_fault(&collision.contact)) {
             Fate::Other
         } else {

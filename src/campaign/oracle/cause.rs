@@ -36,7 +36,8 @@ pub(super) const AGAIN_MIN: usize = 6;
 /// Why no cause can be found.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{ads}` is not made of modules that could be at fault: only `modular` is, so `--causes` and `diagnose` are for it alone"
+    "`{ads}` is not made of modules that could be at fault: only `modular` is, so `--causes` is for it alone; `diagnose` looks at any driving \
+     system from outside"
 )]
 pub struct NoModules {
     pub ads: String,

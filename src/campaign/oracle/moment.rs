@@ -10,13 +10,10 @@
 //! Beside that, a careful driver takes over at each moment: until when would one have avoided the collision?
 
 use crate::episode::{EpisodeLog, Script, Setup};
-use avastra_base::rng;
-use avastra_base::rng::Stream;
-use avastra_world::sim::Start;
 
 use super::avoidable::avoidable_until;
 use super::case::{Case, Found};
-use super::recurrence::Recurrence;
+use super::recurrence::{Recurrence, other_reactions};
 
 /// Moments are looked at from this long before the finding on, s: as far as careful drivers are taken back.
 const LOOK_BACK_S: f64 = 8.0;
@@ -134,8 +131,14 @@ impl Looked<'_> {
             return *known;
         }
         let mut again = Recurrence::default();
-        while again.replays < self.most && !again.is_below(LIKELY) && !again.is_above(LIKELY) {
-            again = again.and(self.case.is_again(&branch(self.case, time_s, again.replays + 1)));
+        let mut number = 0;
+        while number < self.most && !again.is_below(LIKELY) && !again.is_above(LIKELY) {
+            number += 1;
+            let log = branch(self.case, time_s, number);
+            // A branch in which the driving system failed says nothing.
+            if log.failure.is_none() || self.case.is_again(&log) {
+                again = again.and(self.case.is_again(&log));
+            }
         }
         let branched = Branched { time_s, again };
         self.moments.push(branched);
@@ -145,16 +148,8 @@ impl Looked<'_> {
 
 /// The nth branch from a moment.
 fn branch(case: &Case, time_s: f64, number: u32) -> EpisodeLog {
-    let Setup { ads, seed, start, .. } = case.setup;
-    let setup = Setup {
-        start: Start {
-            // Never 0, which is the usual order.
-            reactions: rng::child_seed(*seed, Stream::Noise, u64::from(number)) | 1,
-            reactions_from_s: time_s,
-            ..*start
-        },
-        ..case.setup.clone()
-    };
+    let ads = &case.setup.ads;
+    let setup = Setup { start: other_reactions(case.setup, number, time_s), ..case.setup.clone() };
     let successor = ads.clone().with_other_noise(number);
     Case { setup: &setup, script: case.script.clone(), what: case.what }
         .play(&ads.clone().until(time_s, successor))

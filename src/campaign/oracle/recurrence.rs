@@ -210,15 +210,21 @@ fn with_a_step_more(script: &Script) -> Script {
     script
 }
 
+/// The start of an episode in which the other road users look at the world at other moments from a time on, s.
+pub(super) fn other_reactions(setup: &Setup, number: u32, from_s: f64) -> Start {
+    Start {
+        // Never 0, which is the usual order.
+        reactions: rng::child_seed(setup.seed, Stream::Noise, u64::from(number)) | 1,
+        reactions_from_s: from_s,
+        ..setup.start
+    }
+}
+
 /// The nth play of a script under other chance.
 fn replay(setup: &Setup, script: &Script, number: u32) -> EpisodeLog {
     let setup = Setup {
         ads: setup.ads.clone().with_other_noise(number),
-        start: Start {
-            // Never 0, which is the usual order.
-            reactions: rng::child_seed(setup.seed, Stream::Noise, u64::from(number)) | 1,
-            ..setup.start
-        },
+        start: other_reactions(setup, number, 0.0),
         ..setup.clone()
     };
     let mut choose = |moment: &Moment| script.choose(moment);

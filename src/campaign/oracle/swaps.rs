@@ -1,6 +1,6 @@
 //! What a failure of any driving system hangs on: what it is told, and what becomes of its commands.
 //!
-//! The ego vehicle drives as it did until the obstacle appears (before a breach, until 15 s before it). From then on one thing is
+//! The ego vehicle drives as it did until the obstacle appears, but at most until 15 s before the failure. From then on one thing is
 //! changed from outside ([`Alteration`]): one road user is left out, every light is said to be red, the brake acts twice as strongly.
 //! Nothing in the driving system is touched, so a program of the user's is asked like any other. Two results count:
 //!
@@ -13,18 +13,22 @@
 //!
 //! Left out: errors from before the obstacle appeared, and swaps of two things.
 
+use core::cell::Cell;
+
 use crate::episode;
 use crate::episode::{EpisodeLog, Setup};
 use avastra_base::geometry::Vec2;
-use avastra_base::rng;
-use avastra_base::rng::Stream;
+use avastra_drivers::external::AnswerKind;
 use avastra_drivers::{Alteration, Selected};
 use avastra_lang::model::vocabulary::{Body, ShownLights};
-use avastra_world::sim::{DT_S, EgoMotion, Sensed, SensedObject, SignalColour, Start, VehicleParameters};
+use avastra_world::sim::{
+    DT_S, EgoMotion, Sensed, SensedObject, SignalColour, VehicleParameters, pedal_acceleration_mps2,
+};
 
 use super::case::{Case, Fate, Found, What};
 use super::cause::{AGAIN_MIN, again, unchanged};
 use super::evidence::{Chance, Comparison, is_told_apart};
+use super::recurrence::other_reactions;
 
 /// A road user must have been seen for so long before the failure, s, or nothing could have been done about it.
 const SEEN_S: f64 = 1.0;
@@ -32,7 +36,7 @@ const SEEN_S: f64 = 1.0;
 const SEEN_PART: f64 = 0.2;
 /// A first command that comes later than this is late, s. The careful drivers of UN R157 perceive a risk after 0.4 s.
 const LATE_S: f64 = 0.4;
-/// Who perceives and tracks others may take so much longer, s: `modular` first reacts after 0.4 to 0.5 s.
+/// A driving system that perceives and tracks others may take so much longer, s: `modular` first reacts after 0.4 to 0.5 s.
 const PERCEIVES_S: f64 = 0.3;
 /// Braking with less than this part of what is needed is weak.
 const WEAK: f64 = 0.75;
@@ -44,15 +48,19 @@ const FAST_MPS: f64 = 5.0;
 const EFFECT_S: f64 = 4.0;
 /// Where it is shown, the ego vehicle must not brake more than this, m/s².
 const FREE_MPS2: f64 = 0.3;
-/// A driver whose median place beside its route is farther off than this, m, and whose quartiles are nearer together than that,
-/// steers to one side.
+/// A driver steers to one side if its median place is farther from its route than this, m, and its quartiles are nearer together
+/// than that distance.
 const BESIDE_M: f64 = 0.15;
-/// That is looked at where it drove for so long, s, faster than so, m/s, and the route goes straight for so far, m.
+/// Farther off, it is in another lane, m.
+const BESIDE_M_MAX: f64 = 1.5;
+/// Its place counts where it drove for at least this long, s, faster than this, m/s, and the route goes straight for this far, m.
 const BESIDE_S: f64 = 3.0;
 const BESIDE_MPS: f64 = 3.0;
 const STRAIGHT_M: f64 = 20.0;
 /// Lights are looked at from so long before the failure on, s.
 const LIGHTS_S: f64 = 15.0;
+/// A crash because of a light happens at most so long after the light was passed, s.
+const JUNCTION_S: f64 = 6.0;
 /// What makes up for a delay that could not be measured, s.
 const AHEAD_S: f64 = 0.5;
 
@@ -68,9 +76,9 @@ pub struct Swaps {
     /// `None` if the way was nowhere free.
     pub response: Option<Response>,
     /// Its steady place to the left of its route where that is straight, m; 0 if it was not steady.
-    pub beside_m: f64,
+    pub offset_m: f64,
     /// Whether it passed a light that was not green in the time that is looked at.
-    pub passed_red: bool,
+    pub passed_light: bool,
     /// Replays with other noise and nothing changed; `None` if none were needed.
     pub chance: Option<Chance>,
     /// What it hangs on; `None` if nothing is told apart.
@@ -82,6 +90,8 @@ pub struct Swaps {
 pub struct Swap {
     pub change: Change,
     pub fate: Fate,
+    /// From when on it was changed, s.
+    pub from_s: f64,
     /// From when on it was told something else, s; `None` if it never was. The time counts in which it could see.
     pub told_s: Option<f64>,
     /// From when on it drove in another way, s; `None` if the drive was the same to the bit until the failure.
@@ -222,7 +232,9 @@ impl Change {
 impl Swap {
     /// Whether the driving system does not use what was changed: it was told something else for long enough, and drove the same.
     pub fn is_ignored(&self, found_s: f64) -> bool {
-        self.differs_s.is_none() && self.told_s.is_some_and(|told_s| told_s + SEEN_S <= found_s)
+        self.fate == Fate::Same
+            && self.differs_s.is_none()
+            && self.told_s.is_some_and(|told_s| told_s + SEEN_S <= found_s)
     }
 }
 
@@ -243,9 +255,12 @@ impl Swaps {
 
     /// Whether it drives the same whatever the lights show.
     fn minds_no_light(&self) -> bool {
-        let is_ignored =
-            |colour| self.swap(|change| change == colour).is_some_and(|swap| swap.differs_s.is_none());
-        is_ignored(Change::Red) && is_ignored(Change::Green)
+        let both = [Change::Red, Change::Green].map(|colour| self.swap(|change| change == colour));
+        let is_ignored = |swap: Option<&Swap>| {
+            swap.is_some_and(|swap| swap.fate == Fate::Same && swap.differs_s.is_none())
+        };
+        both.into_iter().all(is_ignored)
+            && both.into_iter().any(|swap| swap.is_some_and(|swap| swap.told_s.is_some()))
     }
 
     /// Whether it drives the same without the road user, and did not mind one like it in its way.
@@ -277,17 +292,18 @@ impl Swaps {
     fn conclude(&self) -> Option<HangsOn> {
         let is_side = |change| change == Change::Mirrored;
         let is_room = |change| matches!(change, Change::Nearer | Change::Larger);
+        // Without a road user that it is about, more room only slows it down.
+        let is_about_one = self.swap(|change| matches!(change, Change::Without(_))).is_some();
         // A reaction that was not measured may be late or weak.
+        let is_measured = |response: Response| response.late_s.is_some() && response.braking.is_some();
         let is_sound =
-            self.response.is_some_and(|response| response.late_s.is_some() && response.braking.is_some())
-                && !self.is_late()
-                && !self.is_weak();
+            is_about_one && self.response.is_some_and(is_measured) && !self.is_late() && !self.is_weak();
         let rules = [
             (self.minds_none_like_it(), HangsOn::IgnoredRoadUser),
-            (self.passed_red && self.minds_no_light(), HangsOn::IgnoredLights),
+            (self.passed_light && self.minds_no_light(), HangsOn::IgnoredLights),
             (self.prevents(|change| matches!(change, Change::Steering(_))), HangsOn::Steering),
             (self.minds_no_speed(), HangsOn::IgnoredSpeeds),
-            (self.prevents(|change| change == Change::Prompt), HangsOn::Latency),
+            (self.is_late() && self.prevents(|change| change == Change::Prompt), HangsOn::Latency),
             (self.prevents(|change| change == Change::Truth), HangsOn::Perception),
             (self.is_late() && self.prevents(|change| matches!(change, Change::Ahead(_))), HangsOn::Delay),
             (self.is_weak() && self.prevents(|change| matches!(change, Change::Braking(_))), HangsOn::Brakes),
@@ -307,7 +323,7 @@ pub fn swaps(setup: &Setup, log: &EpisodeLog, found: Found) -> Swaps {
 struct Tick {
     sensed: Sensed,
     station_m: f64,
-    beside_m: f64,
+    offset_m: f64,
 }
 
 /// The failure, played once, and then with changes.
@@ -316,6 +332,8 @@ struct Asked<'a> {
     from_s: f64,
     found_s: f64,
     ticks: Vec<Tick>,
+    /// Whether an external driving system failed in a play with other noise.
+    has_failed: Cell<bool>,
 }
 
 impl<'a> Asked<'a> {
@@ -323,17 +341,18 @@ impl<'a> Asked<'a> {
         let mut ticks = Vec::new();
         let setup = case.setup;
         episode::run_watched(setup, &mut |moment| case.script.choose(moment), &mut |world, _, _| {
-            let (station_m, beside_m) = (world.ego_station_m(), world.ego_offset_m());
-            ticks.push(Tick { sensed: world.sensed(), station_m, beside_m });
+            let (station_m, offset_m) = (world.ego_station_m(), world.ego_offset_m());
+            ticks.push(Tick { sensed: world.sensed(), station_m, offset_m });
         });
-        Asked { case, from_s: case.begins_s(), found_s: case.time_s(), ticks }
+        let (from_s, found_s) = (case.begins_s(), case.time_s());
+        Asked { case, from_s, found_s, ticks, has_failed: Cell::new(false) }
     }
 
     fn swaps(&self, noun: &'static str) -> Swaps {
         let response = self.response();
-        let beside_m = self.beside_m();
+        let offset_m = self.offset_m();
         let mut swaps: Vec<Swap> =
-            self.changes(response, beside_m).into_iter().map(|change| self.swap(change)).collect();
+            self.changes(response, offset_m).into_iter().map(|change| self.swap(change)).collect();
         let asked = |swap: &&mut Swap| {
             let is_asked = matches!(
                 swap.change,
@@ -353,7 +372,8 @@ impl<'a> Asked<'a> {
         if tries > 0 {
             let plain = unchanged(|noise| self.vanishes(None, noise));
             chance = Some(Chance::of(&plain));
-            if again(&plain) >= AGAIN_MIN {
+            // Where a program fails, a play says nothing, so that nothing can be told apart.
+            if again(&plain) >= AGAIN_MIN && !self.has_failed.get() {
                 for swap in swaps.iter_mut().filter(asked) {
                     let changed =
                         (1..=plain.len() as u32).map(|noise| self.vanishes(Some(swap.change), noise));
@@ -361,10 +381,10 @@ impl<'a> Asked<'a> {
                 }
             }
         }
-        let passed_red = self.passed_red();
+        let passed_light = self.passed_light();
         let (found_s, from_s) = (self.found_s, self.from_s);
         let found =
-            Swaps { noun, found_s, from_s, swaps, response, beside_m, passed_red, chance, hangs_on: None };
+            Swaps { noun, found_s, from_s, swaps, response, offset_m, passed_light, chance, hangs_on: None };
         Swaps { hangs_on: found.conclude(), ..found }
     }
 
@@ -376,6 +396,12 @@ impl<'a> Asked<'a> {
         }
     }
 
+    /// Whether it steers itself: avastra does for programs that answer accelerations.
+    fn steers(&self) -> bool {
+        let identity = self.case.setup.ads.program().and_then(|program| program.attached().identity);
+        identity.is_none_or(|identity| identity.answer != AnswerKind::Acceleration)
+    }
+
     /// Whether it is told how fast others are. What perceives and tracks others works that out from their places.
     fn is_told_speeds(&self) -> bool {
         let ads = &self.case.setup.ads;
@@ -383,7 +409,7 @@ impl<'a> Asked<'a> {
     }
 
     /// What is changed, one after the other.
-    fn changes(&self, response: Option<Response>, beside_m: f64) -> Vec<Change> {
+    fn changes(&self, response: Option<Response>, offset_m: f64) -> Vec<Change> {
         let late_s = response.and_then(|response| response.late_s).unwrap_or(AHEAD_S);
         let ahead_s = (late_s.max(0.2) / DT_S).round() * DT_S;
         let weak =
@@ -406,8 +432,8 @@ impl<'a> Asked<'a> {
             changes.extend(program.settings().shows_perceived().then_some(Change::Truth));
             changes.extend((latency > 0).then_some(Change::Prompt));
         }
-        if beside_m != 0.0 {
-            changes.extend([0.01, 0.02, 0.04].map(|by_rad| Change::Steering(-by_rad * beside_m.signum())));
+        if offset_m != 0.0 && self.steers() {
+            changes.extend([0.01, 0.02, 0.04].map(|by_rad| Change::Steering(-by_rad * offset_m.signum())));
         }
         changes
     }
@@ -415,7 +441,8 @@ impl<'a> Asked<'a> {
     fn swap(&self, change: Change) -> Swap {
         let (log, motions) = self.play(self.changed(change.alteration(), self.begins_s(change)), None);
         let differs_s = self.differs_s(&motions).filter(|differs_s| *differs_s < self.found_s);
-        Swap { change, fate: self.case.fate(&log), told_s: self.told_s(change), differs_s, noise: None }
+        let (fate, from_s, told_s) = (self.case.fate(&log), self.begins_s(change), self.told_s(change));
+        Swap { change, fate, from_s, told_s, differs_s, noise: None }
     }
 
     /// From when on a thing is changed, s: a light may have been passed before its obstacle appeared.
@@ -438,21 +465,15 @@ impl<'a> Asked<'a> {
             None => ads,
         };
         let ads = self.case.setup.ads.clone().until(self.from_s, ads);
-        self.case.fate(&self.play(ads, Some(noise)).0) == Fate::Vanished
+        let fate = self.case.fate(&self.play(ads, Some(noise)).0);
+        self.has_failed.set(self.has_failed.get() || fate == Fate::Failed);
+        fate == Fate::Vanished
     }
 
     /// The scenario with a driving system; with a number also other reactions of others from the hazard on.
     fn play(&self, ads: Selected, noise: Option<u32>) -> (EpisodeLog, Vec<EgoMotion>) {
-        let Setup { seed, start, .. } = self.case.setup;
-        let start = match noise {
-            None => *start,
-            // Never 0, which is the usual order.
-            Some(number) => Start {
-                reactions: rng::child_seed(*seed, Stream::Noise, u64::from(number)) | 1,
-                reactions_from_s: self.from_s,
-                ..*start
-            },
-        };
+        let usual = self.case.setup;
+        let start = noise.map_or(usual.start, |number| other_reactions(usual, number, self.from_s));
         let setup = Setup { ads, start, ..self.case.setup.clone() };
         let mut motions = Vec::new();
         let log = episode::run_watched(
@@ -467,6 +488,8 @@ impl<'a> Asked<'a> {
     fn differs_s(&self, motions: &[EgoMotion]) -> Option<f64> {
         let own = self.ticks.iter().map(|tick| tick.sensed.ego);
         let differs = own.zip(motions).position(|(own, other)| own != *other);
+        // A play that ends sooner differs at its end.
+        let differs = differs.or((motions.len() < self.ticks.len()).then_some(motions.len()));
         differs.map(|tick| self.ticks[tick].sensed.time_s)
     }
 
@@ -481,7 +504,8 @@ impl<'a> Asked<'a> {
             told != seen
         };
         let is_within = |tick: &&Tick| tick.sensed.time_s >= self.begins_s(change) - 1e-6;
-        self.ticks.iter().filter(is_within).find(tells).map(|tick| tick.sensed.time_s)
+        let told = self.ticks.iter().filter(is_within).find(tells).map(|tick| tick.sensed.time_s);
+        told.filter(|told_s| *told_s < self.found_s)
     }
 
     /// Shows a car that is not there, once, where the way was free.
@@ -501,7 +525,7 @@ impl<'a> Asked<'a> {
                 && ego.acceleration_mps2 > -FREE_MPS2
                 && tick.sensed.time_s + EFFECT_S < self.found_s
                 && tick.station_m + look_m < route.path.length_m()
-                && tick.beside_m.abs() < 1.0
+                && tick.offset_m.abs() < 1.0
                 && !lines.into_iter().any(|ahead_m| ahead_m > 0.0 && ahead_m < look_m)
                 && route.path.turned_rad(tick.station_m, tick.station_m + look_m).abs() < 0.2
                 && !tick.sensed.objects.iter().any(|object| is_before(object.pose.position))
@@ -524,11 +548,19 @@ impl<'a> Asked<'a> {
             lights: ShownLights::Off,
         };
         let shown = |object| self.play(self.changed(Alteration::Phantom(object), shown_s), None).1;
-        let motions = shown(car_there);
+        let (log, motions) = self.play(self.changed(Alteration::Phantom(car_there), shown_s), None);
+        // A program that cannot bear the sight has not ignored it.
+        if log.failure.is_some() {
+            return None;
+        }
         // Nearer, some drivers brake as hard as they can for either.
         let farther_m = station_m + away_m(tick.sensed.ego.speed_mps);
         let farther = SensedObject { pose: route.path.pose_at(farther_m), ..car_there };
         let velocity_mps = farther.pose.forward() * tick.sensed.ego.speed_mps;
+        // What differs much later is no reaction.
+        let reacts = |motions: &[EgoMotion]| {
+            self.differs_s(motions).filter(|differs_s| differs_s - shown_s <= EFFECT_S)
+        };
         let minds_speed =
             self.is_told_speeds().then(|| shown(SensedObject { velocity_mps, ..farther }) != shown(farther));
         let minds_its_like = self.about().and_then(|id| {
@@ -536,25 +568,29 @@ impl<'a> Asked<'a> {
                 self.ticks.iter().flat_map(|tick| &tick.sensed.objects).find(|object| object.id == id)?;
             let SensedObject { pose, velocity_mps, visible_fraction, .. } = car_there;
             let there = SensedObject { pose, velocity_mps, visible_fraction, ..*its_like };
-            Some(self.differs_s(&shown(there)).is_some())
+            Some(reacts(&shown(there)).is_some())
         });
         let none = Response { shown_s, late_s: None, braking: None, minds_its_like, minds_speed };
-        let Some(differs_s) = self.differs_s(&motions) else { return Some(none) };
+        let Some(differs_s) = reacts(&motions) else { return Some(none) };
         // A command acts in the tick after it.
         let late_s = (differs_s - shown_s - DT_S).max(0.0);
         let after = motions.iter().skip(free).take((EFFECT_S / DT_S) as usize);
         let hardest_mps2 = after.clone().map(|motion| -motion.acceleration_mps2).fold(0.0, f64::max);
         let goes_around = after.clone().any(|motion| {
-            let (_, beside_m) = route.path.beside(motion.rear_axle.position);
-            (beside_m - tick.beside_m).abs() > 0.7
+            let (_, offset_m) = route.path.beside(motion.rear_axle.position);
+            (offset_m - tick.offset_m).abs() > 0.7
         });
-        let needed_mps2 = NEEDED_MPS2.min(8.5 * tick.sensed.conditions.friction);
+        // It may stop just before the car.
+        let speed_mps = tick.sensed.ego.speed_mps;
+        let needed_mps2 = speed_mps * speed_mps / (2.0 * away_m(speed_mps));
+        let possible_mps2 = -pedal_acceleration_mps2(0.0, 100.0) * tick.sensed.conditions.friction;
+        let needed_mps2 = needed_mps2.min(possible_mps2);
         let braking = (!goes_around).then_some(hardest_mps2 / needed_mps2);
         Some(Response { late_s: Some(late_s), braking, ..none })
     }
 
     /// Its steady place to the left of its route where that is straight, m; 0 if it was not steady.
-    fn beside_m(&self) -> f64 {
+    fn offset_m(&self) -> f64 {
         let path = &self.case.setup.scene.route.path;
         let is_straight = |tick: &&Tick| {
             let station_m = tick.station_m;
@@ -562,20 +598,29 @@ impl<'a> Asked<'a> {
                 && tick.sensed.ego.speed_mps > BESIDE_MPS
                 && path.turned_rad(station_m, (station_m + STRAIGHT_M).min(path.length_m())).abs() < 0.02
         };
-        let mut places: Vec<f64> = self.ticks.iter().filter(is_straight).map(|tick| tick.beside_m).collect();
+        let mut places: Vec<f64> = self.ticks.iter().filter(is_straight).map(|tick| tick.offset_m).collect();
         if places.len() < (BESIDE_S / DT_S) as usize {
             return 0.0;
         }
         places.sort_by(f64::total_cmp);
         let part = |of: f64| places[(of * (places.len() - 1) as f64) as usize];
         let (low, middle, high) = (part(0.25), part(0.5), part(0.75));
-        if middle.abs() > BESIDE_M && high - low < middle.abs() { middle } else { 0.0 }
+        let is_steady = (BESIDE_M..BESIDE_M_MAX).contains(&middle.abs()) && high - low < middle.abs();
+        if is_steady { middle } else { 0.0 }
+    }
+
+    /// From when on a light that was passed may have led to the failure, s: a crash is in the junction.
+    fn lights_from_s(&self) -> f64 {
+        match self.case.what {
+            What::Collision { .. } => self.found_s - JUNCTION_S,
+            What::Breach(_) => self.begins_s(Change::Red),
+        }
     }
 
     /// Whether its front passed a line of the route while the light was not green, in the time that is looked at.
-    fn passed_red(&self) -> bool {
+    fn passed_light(&self) -> bool {
         let front_m = VehicleParameters::MKZ.rear_axle_to_front_m;
-        let from_s = self.begins_s(Change::Red);
+        let from_s = self.lights_from_s();
         let is_within = |tick: &Tick| (from_s..=self.found_s).contains(&tick.sensed.time_s);
         self.case.setup.scene.route.stop_lines.iter().any(|line| {
             self.ticks.windows(2).any(|pair| {

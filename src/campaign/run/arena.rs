@@ -149,7 +149,6 @@ impl Arena {
             seed,
             start: Start { traffic: self.traffic, ..Start::drawn(space, road, &memory, seed) },
             memory,
-            period_shifts: Vec::new(),
             proc: ProcKind::default(),
         }
     }

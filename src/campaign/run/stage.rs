@@ -62,7 +62,6 @@ impl<'a> Stage<'a> {
                 ..Start::drawn(space, &space.roads[self.scenario.road], &memory, seed)
             },
             memory,
-            period_shifts: Vec::new(),
             proc: ProcKind::default(),
         }
     }

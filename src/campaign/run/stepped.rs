@@ -50,7 +50,7 @@ impl Measures {
         self.distance_m = others.chain(self.distance_m).reduce(smaller);
     }
 
-    /// Of two periods together.
+    /// The nearer of two periods.
     #[must_use]
     pub fn and(&self, other: &Measures) -> Measures {
         Measures {
@@ -64,7 +64,9 @@ impl Measures {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chosen {
     pub row: usize,
-    /// By the names of parameters, SI. Each is moved to the nearest legal one, where the others allow it; what is not given is drawn.
+    /// By the names of parameters, SI. What is not given is drawn beside them; see [`ActionTable::offer_with`].
+    ///
+    /// [`ActionTable::offer_with`]: avastra_world::action::ActionTable::offer_with
     pub values: Vec<(Arc<str>, Value)>,
 }
 
@@ -75,9 +77,9 @@ pub enum StepError {
     Over { end: &'static str },
     #[error("no row {row}: the table has rows 0 to {last}")]
     Row { row: usize, last: usize },
-    #[error("`{action}` draws no `{name}`; `Space.draws` lists what a row draws")]
+    #[error("`{action}` draws no `{name}`")]
     NoDraw { action: String, name: String },
-    #[error("that is no value of `{name}`; `Space.draws` lists them")]
+    #[error("that is none of the listed values of `{name}`")]
     NoValue { name: String },
 }
 
@@ -170,8 +172,11 @@ impl Stepped {
         chosen: &[Option<Chosen>],
         watch: &mut dyn FnMut(&World),
     ) -> Result<(), StepError> {
+        watch(self.play.world());
         for chosen in chosen.iter().map(Option::as_ref).chain(std::iter::repeat(None)) {
             if self.end.is_some() {
+                // What is legal is known again, for a snapshot.
+                self.look();
                 return Ok(());
             }
             let choice = chosen.map_or(Ok(Choice::Pass), |chosen| self.choice(chosen))?;
@@ -201,22 +206,7 @@ impl Stepped {
                 return Err(StepError::NoValue { name: name.to_string() });
             }
         }
-        let judged = |moment: &Moment| {
-            let drawn = table.offer(moment.situation, *row)?;
-            if values.is_empty() {
-                return Ok(drawn);
-            }
-            let given =
-                |name: &Arc<str>| values.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
-            let wanted: Vec<(Arc<str>, Value)> = drawn
-                .values
-                .iter()
-                .map(|(name, value)| (name.clone(), given(name).unwrap_or(*value)))
-                .collect();
-            table
-                .nearest(moment.situation, *row, &wanted)
-                .map_err(|refusals| refusals.into_iter().next().expect("a refusal has a reason"))
-        };
+        let judged = |moment: &Moment| table.offer_with(moment.situation, *row, values);
         Ok(Choice::of(*row, self.play.at(&self.observation, judged)))
     }
 

@@ -68,7 +68,14 @@ impl Toy<'_> {
 
     /// The line that answers a message, if one is due.
     fn answer(&mut self, message: Question) -> Result<Option<String>, Failure> {
-        let ready = Ready { protocol: None, name: None, version: None, answer: None, deterministic: None };
+        let ready = Ready {
+            protocol: None,
+            name: None,
+            version: None,
+            answer: None,
+            deterministic: None,
+            wants: None,
+        };
         let answer = match message {
             Question::Init(_) if self.misbehaves(Misbehaviour::CrashAtStart) => return Err(crashed()),
             Question::Init(_) => Answer::Ready(Ready {
@@ -77,6 +84,7 @@ impl Toy<'_> {
                 version: Some(self.arguments.as_version.clone()),
                 answer: Some(self.kind()),
                 deterministic: Some(!self.arguments.not_deterministic),
+                wants: (!self.arguments.wants.is_empty()).then(|| self.arguments.wants.clone()),
             }),
             Question::Map(_) => Answer::Ready(ready),
             Question::Reset(reset) => {

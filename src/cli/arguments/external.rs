@@ -60,6 +60,9 @@ pub struct ToyArguments {
     /// Say that it may answer otherwise when asked the same again.
     #[arg(long)]
     pub not_deterministic: bool,
+    /// A group of fields that it also wants.
+    #[arg(long, value_name = "GROUP")]
+    pub wants: Vec<String>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

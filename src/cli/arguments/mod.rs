@@ -112,7 +112,7 @@ pub enum Command {
     Report(ReportArguments),
     /// Draw moments of an emitted scenario as SVG.
     Render(RenderArguments),
-    /// Say which module of the driving system is at fault for a crash.
+    /// Say what a crash or a breach hangs on.
     Diagnose(DiagnoseArguments),
     /// Find the smallest scenario that still makes the same crash.
     Shrink(ShrinkArguments),

@@ -50,8 +50,8 @@ pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Fa
     found.done.iter().for_each(|found| *causes.entry(found.why.cause()).or_default() += 1);
     let mut causes: Vec<(String, usize)> = causes.into_iter().collect();
     causes.sort_by_key(|(_, count)| core::cmp::Reverse(*count));
-    if !found.is_single() {
-        output.say(&format!("\n{}, at fault:", plural(found.done.len(), "finding")));
+    if !found.is_single() && !causes.is_empty() {
+        output.say(&format!("\n{}, by cause:", plural(found.done.len(), "finding")));
         causes.iter().for_each(|(cause, count)| output.say(&format!("{count:>6}  {cause}")));
     }
     let scenarios = found.done.iter().map(Explained::in_json).collect();
@@ -84,6 +84,10 @@ impl Case<'_> {
         let (ads, _) = asked.selected_for(scenario)?;
         let stage = Stage::new(table, scenario)?;
         let (log, _, found) = stage.first_found(&ads);
+        if let (None, Some(failure)) = (found, &log.failure) {
+            let said = failure.in_words();
+            return Err(Failure::usage(format!("`{}`: {said}; {}", scenario.name, failure.problem.advice())));
+        }
         let Some(found) = found else {
             let count = plural(log.collisions.len(), "collision");
             let loose = ads.program().filter(|program| !program.is_deterministic());
@@ -177,6 +181,15 @@ fn explain(
                  `diagnose --moment` works for it",
                 program.attached().name()
             )));
+        }
+        if let (Some(program), Some(first)) = (ads.program(), &log.conversation) {
+            program.spot_check(first, || stage.play(&ads, &mut |_, _, _| {}).conversation);
+            if let Some(otherwise) = program.otherwise() {
+                return Err(Failure::usage(format!(
+                    "`{}` says that it is deterministic, but {otherwise}; so a drive that differs says nothing",
+                    program.attached().name()
+                )));
+            }
         }
         Why::Outside(oracle::swaps(&setup, &log, found))
     } else {

@@ -59,10 +59,13 @@ fn moment_text(noun: &str, risen: &NoReturn) -> String {
         (Some(rises_s), _) => {
             format!("from {rises_s:.1} s on there was the {noun} in more than three quarters of the branches")
         }
-        (None, _) if moments.first().is_some_and(Branched::is_likely) => format!(
+        (None, _) if moments.iter().all(Branched::is_likely) => format!(
             "at each moment of the last {:.0} s there was the {noun} in most branches: it was certain before",
             found_s - moments[0].time_s
         ),
+        (None, _) if moments.iter().all(|at| at.again.replays == 0) => {
+            "the driving system failed in every branch".to_owned()
+        }
         (None, _) => format!("up to the last moment many branches had no {noun}: chance made it"),
     };
     let avoidable = avoidable_until_s.map_or(String::new(), |until_s| {

@@ -1,6 +1,6 @@
 //! What `diagnose` says of a driving system of any kind: what the finding hangs on, as it shows from outside.
 
-use avastra_campaign::oracle::{HangsOn, Response, Swap, Swaps};
+use avastra_campaign::oracle::{Fate, HangsOn, Response, Swap, Swaps};
 
 use super::modules::noise_text;
 
@@ -19,16 +19,19 @@ fn table_text(swaps: &Swaps) -> String {
     let Swaps { noun, from_s, .. } = swaps;
     let head = format!("from {from_s:.1} s on");
     let mut text =
-        format!("\n{head:<46}{:<20}{:<24}{}", "what becomes of it", "the drive", "with other noise");
+        format!("\n{head:<50}{:<20}{:<24}{}", "what becomes of it", "the drive", "with other noise");
     for swap in &swaps.swaps {
         let (change, fate) = (swap.change.in_words(), swap.fate.in_words(noun));
         let noise = swap.noise.map_or(String::new(), noise_text);
-        let line = format!("{change:<46}{fate:<20}{:<24}{noise}", drive_text(swap));
+        // Lights are changed earlier.
+        let early =
+            if swap.from_s < *from_s { format!(" from {:.1} s on", swap.from_s) } else { String::new() };
+        let line = format!("{:<50}{fate:<20}{:<24}{noise}", change + &early, drive_text(swap));
         text.push_str(&format!("\n{}", line.trim_end()));
     }
     if let Some(chance) = swaps.chance {
         let count = format!("no {noun} in {} of {}", chance.vanished, chance.replays);
-        text.push_str(&format!("\n{:<90}{count}", "nothing changed (chance)"));
+        text.push_str(&format!("\n{:<94}{count}", "nothing changed (chance)"));
     }
     text
 }
@@ -44,12 +47,12 @@ fn drive_text(swap: &Swap) -> String {
 
 fn response_text(swaps: &Swaps) -> String {
     let Some(Response { shown_s, late_s, braking, minds_its_like, minds_speed }) = swaps.response else {
-        return "\n\nIts way was never free, so its reactions were not measured.".to_owned();
+        return "\n\nIts reactions were not measured: there was no straight and free way at 5 m/s, or the program failed.".to_owned();
     };
     let mut text = format!("\n\nIt was told at {shown_s:.1} s of a car in its way that was not there:");
     match late_s {
         None => text.push_str("\n- It did nothing about it."),
-        Some(late_s) => text.push_str(&format!("\n- Its first other command came after {late_s:.2} s.")),
+        Some(late_s) => text.push_str(&format!("\n- It reacted after {late_s:.2} s.")),
     }
     match braking {
         Some(part) if late_s.is_some() => {
@@ -69,11 +72,11 @@ fn response_text(swaps: &Swaps) -> String {
 
 /// Where it drives on straight roads, if that is beside its route.
 fn beside_text(swaps: &Swaps) -> String {
-    if swaps.beside_m == 0.0 {
+    if swaps.offset_m == 0.0 {
         return String::new();
     }
-    let side = if swaps.beside_m > 0.0 { "left" } else { "right" };
-    format!("\n\nOn straight roads it drives {:.2} m to the {side} of its route.", swaps.beside_m.abs())
+    let side = if swaps.offset_m > 0.0 { "left" } else { "right" };
+    format!("\n\nOn straight roads it drives {:.2} m to the {side} of its route.", swaps.offset_m.abs())
 }
 
 /// The verdict in a sentence that follows from the evidence alone.
@@ -125,19 +128,49 @@ pub fn sentence(swaps: &Swaps) -> String {
                 "the {noun} hangs on how much room it keeps: told of others nearer or larger, there is no {noun}"
             )
         }
-        None => format!("nothing is named that the {noun} hangs on"),
+        None => format!("nothing is named that the {noun} hangs on: {}", lack_text(swaps)),
+    }
+}
+
+/// Why nothing is named.
+fn lack_text(swaps: &Swaps) -> String {
+    let noun = swaps.noun;
+    let removing: Vec<String> = swaps
+        .swaps
+        .iter()
+        .filter(|swap| swap.noise.is_some_and(|noise| noise.is_told_apart()))
+        .map(|swap| swap.change.in_words())
+        .collect();
+    let failed = swaps.swaps.iter().any(|swap| swap.fate == Fate::Failed);
+    match (&swaps.chance, removing.as_slice()) {
+        _ if failed => "the program failed when something was changed".to_owned(),
+        (Some(chance), []) => format!(
+            "what removes it is not told apart from chance, which removes it in {} of {} replays",
+            chance.vanished, chance.replays
+        ),
+        (_, []) => format!("no change that is made for sure removes the {noun}"),
+        (_, _) if swaps.response.is_none() => "its reactions could not be measured".to_owned(),
+        (_, all) => {
+            format!("these remove the {noun}, and would save a sound driver, too: {}", all.join("; "))
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use avastra_campaign::oracle::{Change, Fate};
+    use avastra_campaign::oracle::Change;
 
     #[test]
     fn a_table_says_what_was_not_used() {
-        let swap =
-            |change, told_s, differs_s| Swap { change, fate: Fate::Same, told_s, differs_s, noise: None };
+        let swap = |change, told_s, differs_s| Swap {
+            change,
+            fate: Fate::Same,
+            from_s: 2.0,
+            told_s,
+            differs_s,
+            noise: None,
+        };
         let swaps = Swaps {
             noun: "breach",
             found_s: 9.0,
@@ -148,16 +181,16 @@ mod tests {
                 swap(Change::Braking(2.0), None, Some(4.0)),
             ],
             response: None,
-            beside_m: -0.3,
-            passed_red: true,
+            offset_m: -0.3,
+            passed_light: true,
             chance: None,
             hangs_on: Some(HangsOn::IgnoredLights),
         };
         let text = whole_text(&swaps);
         for wanted in [
-            "it is told that lights are red                breach              is the same",
-            "it is told of nobody                          breach              nothing was changed",
-            "its brake acts 2.0 times as strongly          breach              differs from 4.00 s",
+            "it is told that lights are red                    breach              is the same",
+            "it is told of nobody                              breach              nothing was changed",
+            "its brake acts 2.0 times as strongly              breach              differs from 4.00 s",
             "were not measured",
             "0.30 m to the right of its route",
             "the breach hangs on ignored lights",

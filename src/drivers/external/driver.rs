@@ -11,13 +11,13 @@ use crate::altered::Alteration;
 use crate::driver::Ads;
 use crate::modular::{Modular, ModularConfig};
 use crate::status::{PerceivedObject, Reason, Status};
-use avastra_base::geometry::{Pose, Vec2};
+use avastra_base::geometry::{Pose, Vec2, wrap_angle};
 use avastra_base::outside::in_line;
 use avastra_world::sim::{Control, DT_S, Scene, Sensed};
 
 use super::finding::{Failure, FailureKind, Problem};
 use super::follow::Follower;
-use super::message::{Answer, Event, Question};
+use super::message::{Answer, Event, ObjectMessage, Question};
 use super::program::{MapLine, Program};
 use super::question;
 use super::record::{Conversation, Key, Outcome, Told, Transcript};
@@ -28,7 +28,7 @@ use super::settings::OnTimeout;
 const LOST_S: f64 = 2.0;
 
 /// Numbers of objects that no track follows begin here, where the truth is shown in place of what is perceived.
-const UNTRACKED_ID_MIN: u64 = 1 << 32;
+const UNTRACKED_ID_MIN: u64 = 0x6000_0000;
 
 /// An external driving system in one episode.
 #[derive(Clone)]
@@ -42,6 +42,9 @@ pub struct External {
     /// From when on it is told the truth all the same, and obeyed at once, s.
     truth_from_s: f64,
     prompt_from_s: f64,
+    wants: Wants,
+    /// The objects of the step before, by number, for what is derived from two steps.
+    before: Vec<Known>,
     follower: Follower,
     /// The questions so far, the `reset` first, each with its outcome.
     exchanges: Vec<Exchange>,
@@ -64,6 +67,50 @@ struct Exchange {
     step: Option<(u64, u64)>,
     outcome: Outcome,
     told: Arc<Told>,
+}
+
+/// The groups of fields that the program asked for.
+#[derive(Debug, Clone, Copy)]
+struct Wants {
+    motion: bool,
+    conflicts: bool,
+    names: bool,
+}
+
+/// What was told of an object.
+#[derive(Debug, Clone, Copy)]
+struct Known {
+    id: u64,
+    /// When it was first told without a gap since, and now, µs.
+    first_us: u64,
+    now_us: u64,
+    velocity_mps: Vec2,
+    heading_rad: f64,
+}
+
+/// Adds what follows from the step before: accelerations, turns and ages. Returns what is known now.
+fn moved(objects: &mut [ObjectMessage], before: &[Known], now_us: u64) -> Vec<Known> {
+    let known = objects.iter_mut().map(|object| {
+        let id = object.id;
+        let now = Known {
+            id,
+            first_us: now_us,
+            now_us,
+            velocity_mps: Vec2::new(object.vx, object.vy),
+            heading_rad: object.heading,
+        };
+        let last = before.iter().find(|known| known.id == id).copied();
+        let now = Known { first_us: last.map_or(now_us, |last| last.first_us), ..now };
+        let last = last.unwrap_or(now);
+        let passed_s = ((now_us - last.now_us) as f64 / 1e6).max(DT_S);
+        let acceleration = (now.velocity_mps - last.velocity_mps) / passed_s;
+        object.ax = Some(question::number(acceleration.x));
+        object.ay = Some(question::number(acceleration.y));
+        object.yaw_rate = Some(question::number(wrap_angle(now.heading_rad - last.heading_rad) / passed_s));
+        object.age = Some(question::number((now_us - now.first_us) as f64 / 1e6));
+        now
+    });
+    known.collect()
 }
 
 /// What a process answered.
@@ -94,6 +141,12 @@ impl External {
             observer: program.settings().shows_perceived().then(observer),
             truth_from_s: f64::INFINITY,
             prompt_from_s: f64::INFINITY,
+            wants: Wants {
+                motion: program.wants("motion"),
+                conflicts: program.wants("conflicts"),
+                names: program.wants("names"),
+            },
+            before: Vec::new(),
             follower: Follower::new(scene),
             exchanges: Vec::new(),
             live: Live::default(),
@@ -116,7 +169,7 @@ impl External {
         }
     }
 
-    /// Who perceives what is shown now; `None` if the truth is shown.
+    /// The system whose perception is shown at this time; `None` if the truth is shown.
     fn perceives(&self, time_s: f64) -> Option<&Modular> {
         self.observer.as_deref().filter(|_| time_s < self.truth_from_s - 1e-6)
     }
@@ -124,7 +177,13 @@ impl External {
     /// Asks what to do, at this tick.
     fn ask(&mut self, sensed: &Sensed, tick: u64, route_m: (f64, f64)) {
         if self.exchanges.is_empty() {
-            let reset = question::reset(&self.scene, sensed, self.seed);
+            let mut reset = question::reset(&self.scene, sensed, self.seed);
+            if self.wants.conflicts {
+                reset.route.conflicts = Some(question::conflicts(&self.scene));
+            }
+            if self.wants.names {
+                reset.episode_seed = Some(self.seed.to_string());
+            }
             let line = Question::Reset(reset).line().into();
             if let Some(outcome) = self.exchange(line, self.map.key, None, Vec::new()) {
                 debug_assert_eq!(outcome, Outcome::Ready);
@@ -146,6 +205,19 @@ impl External {
                 object.id = known.map_or(UNTRACKED_ID_MIN + object.id, |known| known.track.into());
             }
         }
+        let perceived = perceives.map(|observer| &observer.status().perceived);
+        let tracks: Vec<(u32, Option<u32>)> = match perceived {
+            Some(perceived) => perceived.iter().map(|object| (object.track, object.id)).collect(),
+            None => sensed.objects.iter().map(|object| (object.id, Some(object.id))).collect(),
+        };
+        if self.wants.names {
+            for (object, (_, npc)) in step.objects.iter_mut().zip(&tracks) {
+                object.npc = npc.map(u64::from);
+            }
+        }
+        if self.wants.motion {
+            self.before = moved(&mut step.objects, &self.before, t_us);
+        }
         let mut lines = String::new();
         if sensed.ego.touched && !self.touched {
             lines = Question::Event(Event { kind: "collision".to_owned(), t_us }).line();
@@ -153,16 +225,11 @@ impl External {
         self.touched = sensed.ego.touched;
         lines.push_str(&Question::Step(Box::new(step)).line());
         let before = self.exchanges[self.exchanges.len() - 1].key;
-        let perceived = self.observer.as_ref().map(|observer| &observer.status().perceived);
-        let tracks = match perceived {
-            Some(perceived) => perceived.iter().map(|object| (object.track, object.id)).collect(),
-            None => sensed.objects.iter().map(|object| (object.id, Some(object.id))).collect(),
-        };
         if let Some(Outcome::Answer(answer)) = self.exchange(lines.into(), before, Some((seq, t_us)), tracks)
         {
             let (_, mut latency) = self.program.settings().ticks();
             if sensed.time_s >= self.prompt_from_s - 1e-6 {
-                // What was still to come is overtaken.
+                // Answers that are still due would hold back the new ones.
                 self.coming.clear();
                 latency = 0;
             }

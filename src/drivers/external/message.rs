@@ -294,6 +294,8 @@ message! {
         start: Start;
         goal: Goal;
         route: RouteMessage;
+        ? /// `names`: the episode's seed in full, as scenarios and `run.db` have it.
+        episode_seed: String;
     }
 }
 
@@ -322,6 +324,22 @@ message! {
         signs: Vec<RouteSign>;
         /// Where the path crosses crosswalks: from, to, m.
         crosswalks: Vec<[f64; 2]>;
+        ? /// `conflicts`: where the path crosses other lanes inside junctions.
+        conflicts: Vec<ConflictMessage>;
+    }
+}
+
+message! {
+    /// A crossing with another lane. `precedence` of both lanes, their signs and lights say who goes first.
+    pub struct ConflictMessage {
+        /// Place on the route, m.
+        route_s: f64;
+        /// Id of the other lane.
+        lane: String;
+        /// Place on that lane, m.
+        s: f64;
+        /// Heading of that lane minus that of the route, rad; positive comes from the right.
+        angle: f64;
     }
 }
 
@@ -410,6 +428,16 @@ message! {
         visible: f64;
         ? /// What a vehicle shows that shows something.
         lights: VehicleLights;
+        ? /// `motion`: acceleration in the map frame since the step before, m/s²; 0 in the first.
+        ax: f64;
+        ? /// `motion`: as `ax`.
+        ay: f64;
+        ? /// `motion`: turn of the heading since the step before, rad/s; 0 in the first.
+        yaw_rate: f64;
+        ? /// `motion`: since when it is known under this number without a gap, s.
+        age: f64;
+        ? /// `names`: the road user's number in scenarios and reports. A ghost has none.
+        npc: u64;
     }
 }
 
@@ -462,6 +490,8 @@ message! {
         answer: AnswerKind;
         ? /// Whether the same questions lead to the same answers.
         deterministic: bool;
+        ? /// Groups of fields that it also wants: `motion`, `conflicts`, `names`. Other words are for later versions.
+        wants: Vec<String> => length 0..=20;
     }
 }
 

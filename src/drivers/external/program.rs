@@ -214,6 +214,15 @@ impl Program {
         Attached { identity, settings: self.settings.clone(), is_recorded: false }
     }
 
+    /// Whether the program asks for a group of fields. It is started to find out, if it was not yet.
+    pub(super) fn wants(&self, group: &str) -> bool {
+        if self.identity.get().is_none() && self.may_start {
+            // If it cannot be started, the first question says why.
+            let _ = self.start();
+        }
+        self.identity.get().is_some_and(|identity| identity.wants.iter().any(|word| word == group))
+    }
+
     /// A process that no episode uses; one that has the map, if there is any.
     pub(super) fn session(&self, map: Option<Key>) -> Result<Session, Failure> {
         let mut idle = locked(&self.idle);

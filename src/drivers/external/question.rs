@@ -11,10 +11,10 @@ use avastra_road::{LaneIndex, Neighbour, Precedence, RoadMap, Side, SignKind, Tu
 use avastra_world::sim::{DT_S, EgoMotion, Scene, Sensed, SignalColour, VehicleParameters};
 
 use super::message::{
-    Class, ConditionsMessage, CrosswalkMessage, EgoMessage, Goal, Init, LaneMessage, LaneSign, LaneStop,
-    Light, Map, NeighborMessage, ObjectMessage, PROTOCOL, Point, PrecedenceWord, Reset, RouteChange,
-    RouteMessage, RouteSign, RouteStop, RouteStretch, SignWord, SignalPlace, SignalState, Start, Step,
-    TurnWord, Vehicle, VehicleLights,
+    Class, ConditionsMessage, ConflictMessage, CrosswalkMessage, EgoMessage, Goal, Init, LaneMessage,
+    LaneSign, LaneStop, Light, Map, NeighborMessage, ObjectMessage, PROTOCOL, Point, PrecedenceWord, Reset,
+    RouteChange, RouteMessage, RouteSign, RouteStop, RouteStretch, SignWord, SignalPlace, SignalState, Start,
+    Step, TurnWord, Vehicle, VehicleLights,
 };
 use super::settings::ExternalSettings;
 
@@ -32,7 +32,7 @@ const POSITION_STD_M: f64 = 0.07;
 const SEED_BITS: u32 = 53;
 
 /// A number as a message has it: to the micrometre, and finite.
-fn number(value: f64) -> f64 {
+pub fn number(value: f64) -> f64 {
     if value.is_finite() { (value * 1e6).round() / 1e6 + 0.0 } else { 1e9_f64.copysign(value) }
 }
 
@@ -186,6 +186,7 @@ pub fn reset(scene: &Scene, sensed: &Sensed, seed: u64) -> Reset {
     let goal = route.path.pose_at(route.goal_m);
     let ego = &sensed.ego;
     Reset {
+        episode_seed: None,
         seed: seed & ((1 << SEED_BITS) - 1),
         map: map.name.clone(),
         start: Start {
@@ -228,8 +229,19 @@ pub fn reset(scene: &Scene, sensed: &Sensed, seed: u64) -> Reset {
                 })
                 .collect(),
             crosswalks: each(&route.crosswalks_m, |(from, to)| [number(*from), number(*to)]),
+            conflicts: None,
         },
     }
+}
+
+/// Where the route crosses other lanes.
+pub fn conflicts(Scene { map, route, .. }: &Scene) -> Vec<ConflictMessage> {
+    each(&route.conflicts, |conflict| ConflictMessage {
+        route_s: number(conflict.station_m),
+        lane: lane_id(map, conflict.lane),
+        s: number(conflict.lane_station_m),
+        angle: number(conflict.angle_rad),
+    })
 }
 
 /// A step. `observer` is who believes what is shown; without one, the truth is shown. `route_m` is the place on the
@@ -326,6 +338,11 @@ fn believed(object: &PerceivedObject) -> ObjectMessage {
         height: number(object.height_m),
         visible: 1.0,
         lights: None,
+        ax: None,
+        ay: None,
+        yaw_rate: None,
+        age: None,
+        npc: None,
     }
 }
 

@@ -25,6 +25,9 @@ pub struct Identity {
     pub version: String,
     pub answer: AnswerKind,
     pub deterministic: bool,
+    /// Groups of fields that it is also sent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub wants: Vec<String>,
 }
 
 impl Identity {
@@ -323,7 +326,12 @@ fn identity(ready: Ready, init: &Init) -> Result<Identity, Broken> {
         return Err(Broken { problem: Problem::WrongType, detail });
     }
     let deterministic = ready.deterministic.ok_or_else(|| missing("deterministic"))?;
-    Ok(Identity { name, version, answer, deterministic })
+    let wants = ready.wants.unwrap_or_default();
+    if wants.iter().any(|word| *word != in_line(word) || word.chars().count() > 40) {
+        let detail = "the words of `wants` are short, without control characters".to_owned();
+        return Err(Broken { problem: Problem::WrongShape, detail });
+    }
+    Ok(Identity { name, version, answer, deterministic, wants })
 }
 
 /// An answer to a step at `t_us`, if its values are possible.

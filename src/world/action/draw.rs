@@ -76,6 +76,14 @@ impl<'a> Judge<'a> {
     /// # Errors
     /// The most frequent refusal; the earliest, if several are equally frequent.
     pub fn draw(&self, shares: &[f64]) -> Result<Draw, Refusal> {
+        self.draw_beside(&[], shares)
+    }
+
+    /// As [`Judge::draw`], beside values that stay as they are given.
+    ///
+    /// # Errors
+    /// As there; also if no values of the others fit.
+    pub fn draw_beside(&self, fixed: &[(Arc<str>, Value)], shares: &[f64]) -> Result<Draw, Refusal> {
         let seed = rng::child_seed(self.situation.seed, Stream::Draw, self.situation.step);
         let mut rng = rng::stream(seed, Stream::Draw, self.row.row.index as u64);
         let mut failures: Vec<(usize, Refusal)> = Vec::new();
@@ -87,17 +95,19 @@ impl<'a> Judge<'a> {
             None => failures.push((1, refusal)),
         };
         let parameters = self.action.parameters.iter().enumerate();
-        let open: Vec<usize> = parameters.filter(|(_, p)| !p.axis).map(|(local, _)| local).collect();
+        let is_fixed = |parameter: &Parameter| fixed.iter().any(|(name, _)| *name == parameter.name);
+        let open: Vec<usize> =
+            parameters.filter(|(_, p)| !p.axis && !is_fixed(p)).map(|(local, _)| local).collect();
         let (world, tries) = (self.world(), Cell::new(TRIES_MAX));
         let before = Before { memory: self.situation.memory, world: Some(&world), tries: &tries };
         // No other draw finds what does not exist.
         let refused = |unsolved: Unsolved| self.refused(&unsolved, &world);
-        let given = locals(self.action, self.row.row, &[]);
+        let given = locals(self.action, self.row.row, fixed);
         let mut solver = self.row.solver(given, &open, before).map_err(refused)?;
         // With nothing to draw, every try gives the same result.
-        let fixed = self.action.drawn().next().is_none();
+        let is_single = open.is_empty();
         let mut chance = Chance { rng: &mut rng, shares: shares.iter().copied().map(Some).collect() };
-        for _ in 0..if fixed { 1 } else { DRAWS_MAX } {
+        for _ in 0..if is_single { 1 } else { DRAWS_MAX } {
             tries.set(TRIES_MAX);
             let values = solver.solve(&mut chance).map_err(refused)?;
             chance.shares.clear();

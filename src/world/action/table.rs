@@ -189,6 +189,31 @@ impl ActionTable {
         (Effect::of_change(&self.space, memory, &after), after)
     }
 
+    /// A draw in which some values are given, and the others drawn beside them. If the given ones are not legal so, they are moved: to the
+    /// legal ones nearest to them and to a draw of the row.
+    ///
+    /// # Errors
+    /// The most frequent refusal.
+    pub fn offer_with(&self, situation: &Situation<'_>, row: usize, given: &[(Arc<str>, Value)]) -> Offer {
+        let judge = Judge::new(&self.space, situation, row);
+        let is_within = |(name, value): &(Arc<str>, Value)| {
+            let action = &self.space.actions[self.space.rows[row].action];
+            action.drawn().any(|parameter| parameter.name == *name && parameter.domain.holds(*value))
+        };
+        if given.iter().all(is_within)
+            && let Ok(draw) = judge.draw_beside(given, &[])
+        {
+            return Ok(draw);
+        }
+        let drawn = judge.draw(&[])?;
+        let value = |name: &Arc<str>| given.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
+        let wanted: Vec<(Arc<str>, Value)> =
+            drawn.values.iter().map(|(name, own)| (name.clone(), value(name).unwrap_or(*own))).collect();
+        judge
+            .nearest(&wanted)
+            .map_err(|refusals| refusals.into_iter().next().expect("a refusal has a reason"))
+    }
+
     /// The draw with the legal values nearest to given ones. A number that a rule sets is computed from the
     /// others; a number out of bounds moves to the bound.
     ///
