@@ -119,6 +119,7 @@ class Env(gymnasium.Env[Observation, np.int64]):
 
             - `action_mask`: the rows that are legal next, shape (rows,)
             - `row`: the row that was carried out, -1 without one; `refused`: why the chosen one was not, or `None`
+            - `values`: what it drew, by name (of `VectorEnv` one dict a world); `measures`: how near the step came to a collision
             - `time_s`: when the step began, s
             - `proc`: the largest collision probability of the step, in [0, 1]
             - `collisions`: contacts that began in the step; with `reward="judged"`, `counted`: those that count
@@ -255,7 +256,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
         at_once = self._has_ended & (self.autoreset_mode == AutoresetMode.SAME_STEP)
         infos: Dict[str, Any] = {}
         for world in np.flatnonzero(~at_once).tolist():
-            infos = self._add_info(infos, _with_whole_seed(found[world]), world)
+            infos = self._add_step(infos, found[world], world)
         if at_once.any():
             infos = self._begin_at_once(infos, found)
         self._add_masks(infos)
@@ -288,12 +289,24 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observation, "np.ndarray[Any, Any]", 
             infos = self._add_info(infos, _with_whole_seed(info), int(world))
         return infos
 
+    def _add_step(self, infos: Dict[str, Any], info: Mapping[str, Any], world: int) -> Dict[str, Any]:
+        # Gymnasium would make an array of each value, and a name may be a number of one row and a word of another.
+        told = _with_whole_seed(info)
+        values = told.pop("values", None)
+        infos = self._add_info(infos, told, world)
+        if values is not None:
+            infos.setdefault("values", np.full(self.num_envs, None, dtype=object))[world] = values
+            infos.setdefault("_values", np.zeros(self.num_envs, dtype=bool))[world] = True
+        return infos
+
     def _begin_at_once(self, infos: Dict[str, Any], found: Sequence[Mapping[str, Any]]) -> Dict[str, Any]:
         last = self._shown()
         ended = np.flatnonzero(self._has_ended)
         for world in ended.tolist():
             own = {key: value[world] for key, value in last.items()} if isinstance(last, dict) else last[world]
             final = {**_with_whole_seed(found[world]), "action_mask": self._legal[world].copy()}
+            # `ended` has those of all steps; see `_add_step`.
+            final.pop("values", None)
             kept = {"final_obs": own, "final_info": final}
             infos = self._add_info(infos, kept, int(world))
         return self._begin(ended, [None] * self.num_envs, infos)

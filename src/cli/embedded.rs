@@ -8,9 +8,10 @@ use avastra_campaign::emit;
 use avastra_campaign::episode::{EpisodeLog, Script, Setup};
 use avastra_campaign::run::{EpisodeSummary, Run};
 use avastra_lang::check::Loaded;
+use avastra_lang::model::policy::WEIGHT_MAX;
 use avastra_lang::model::{Policy, Space};
 use avastra_lang::syntax::{DiagnosticRecord, Style, record, render};
-use avastra_search::agent::{QPolicy, Settings, by_name};
+use avastra_search::agent::{LearnerSettings, QPolicy, Settings, by_name};
 use avastra_world::action::ActionTable;
 
 use super::arguments::{ConditionArguments, RuleArguments};
@@ -20,12 +21,6 @@ use super::files::write_named;
 use super::load;
 use super::run_directory::Player;
 use super::train::origin;
-
-/// The largest number of a network in a file of the language.
-const WEIGHT_MAX: f32 = 10_000.0;
-
-/// How every emitted file begins.
-const EMITTED: &str = "//! Emitted by `avastra ";
 
 /// What emits files here, as their first line names it.
 const PYTHON: &str = "(Python)";
@@ -103,6 +98,14 @@ pub fn save(run: &Run, setup: &Setup, log: &EpisodeLog, path: &Path, replays: u3
     player.write_named(&resolved(path), (log, &summary)).map_err(|error| error.to_string())
 }
 
+/// The settings that `avastra train` has by default.
+pub fn preset() -> LearnerSettings {
+    match by_name("ddqn").and_then(|entry| Settings::from_yaml(entry, None, "")) {
+        Some(Ok(Settings::Learning(settings))) => *settings,
+        _ => unreachable!("ddqn learns, and its preset is sound"),
+    }
+}
+
 /// A network that another program trained on the scaled observation.
 #[derive(Debug, Clone)]
 pub struct Trained {
@@ -133,15 +136,10 @@ pub struct Layer {
 pub fn save_policy(run: &Run, path: &Path, trained: &Trained) -> Result<(), String> {
     let table = run.table();
     is_named_and_there(table.space(), path)?;
-    let Some(Ok(Settings::Learning(preset))) =
-        by_name("ddqn").and_then(|entry| Settings::from_yaml(entry, None, ""))
-    else {
-        unreachable!("ddqn learns, and its preset is sound")
-    };
-    let mut settings = *preset;
+    let mut settings = preset();
     settings.network.dueling = false;
-    settings.network.hidden_units =
-        trained.layers.iter().rev().skip(1).rev().map(|layer| layer.biases.len()).collect();
+    let hidden = trained.layers.split_last().map_or(&[][..], |(_, hidden)| hidden);
+    settings.network.hidden_units = hidden.iter().map(|layer| layer.biases.len()).collect();
     settings.choice.masks_choice = trained.is_masked;
     settings.exploration.evaluation_epsilon = 0.0;
     let wanted = QPolicy::shape(&settings, table.rows().len());
@@ -205,8 +203,7 @@ fn is_named_and_there(space: &Space, path: &Path) -> Result<(), String> {
         return Err(format!("`{}` is no name of a file of the language: end it with `.ava`", path.shown()));
     }
     // Only what was emitted is replaced: not a space, nor a file that it uses.
-    let is_foreign = |text: String| !text.starts_with(EMITTED);
-    if path.exists() && load::text(path).map_or(true, is_foreign) {
+    if path.exists() && !load::text(path).is_ok_and(|text| emit::is_emitted(&text)) {
         return Err(format!("`{}` is there, and avastra did not emit it: name another file", path.shown()));
     }
     if !space.path.exists() {

@@ -148,8 +148,8 @@ const MOVED: &[(&str, &str)] = &[
     ("--ads-cmd", "--ads 'COMMAND'"),
     ("--compare", "--ads DRIVER"),
     ("--replays", "--repeat N"),
-    ("--likelihood", "diagnose --moment, which asks how far chance has a part"),
-    ("--mechanisms", "diagnose FILES, which lists each weakness"),
+    ("--likelihood", "diagnose --moment"),
+    ("--mechanisms", "diagnose FILES"),
     ("--fail-on-collision", "--fail-on collision"),
     ("--fail-on-breach", "--fail-on breach"),
 ];

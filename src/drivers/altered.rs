@@ -176,8 +176,9 @@ impl Ads for Altered {
         let asked = match self.alteration {
             Alteration::Late(by_s) => {
                 self.told.push_back(sensed.clone());
-                let past = if self.told.len() > ticks(by_s) { self.told.pop_front() } else { None };
-                let past = past.or_else(|| self.told.front().cloned()).unwrap_or_else(|| sensed.clone());
+                let is_due = self.told.len() > ticks(by_s);
+                let past = if is_due { self.told.pop_front() } else { self.told.front().cloned() };
+                let past = past.expect("one was just added");
                 // Clock and own motion go on: only the picture of the others and of the lights is old.
                 self.ads.drive(&Sensed { time_s: sensed.time_s, ego: sensed.ego, ..past })
             }
@@ -190,7 +191,7 @@ impl Ads for Altered {
         let Alteration::Delayed(by_s) = self.alteration else { return self.alteration.carry_out(asked) };
         self.asked.push_back(asked);
         let due = if self.asked.len() > ticks(by_s) { self.asked.pop_front() } else { None };
-        due.unwrap_or(self.asked[0])
+        due.unwrap_or_else(|| self.asked[0])
     }
 
     fn status(&self) -> &Status {
@@ -218,7 +219,6 @@ impl Ads for Altered {
 mod tests {
     use super::*;
     use crate::testing::{object, sensed};
-    use avastra_lang::model::vocabulary::Body;
 
     #[test]
     fn what_is_mirrored_twice_is_as_it_was() {

@@ -42,16 +42,21 @@ pub fn chosen(table: &ActionTable, step: &Bound<'_, PyAny>) -> PyResult<Option<C
     Ok(Some(Chosen { row, values: values? }))
 }
 
-/// The number of a row.
-pub fn whole(table: &ActionTable, row: &Bound<'_, PyAny>) -> PyResult<usize> {
+/// A row, if there is one of that number.
+pub fn known_row(table: &ActionTable, row: i64) -> Result<usize, String> {
     let last = table.rows().len() - 1;
+    let known = usize::try_from(row).ok().filter(|row| *row <= last);
+    known.ok_or_else(|| format!("no row {row}: the table has rows 0 to {last}"))
+}
+
+/// The number of a row.
+fn whole(table: &ActionTable, row: &Bound<'_, PyAny>) -> PyResult<usize> {
     if row.is_instance_of::<PyBool>() {
         return Err(PyTypeError::new_err(format!("a row is a whole number, not {row}")));
     }
     let number: i64 =
         row.extract().map_err(|_| PyTypeError::new_err(format!("a row is a whole number, not {row}")))?;
-    let known = usize::try_from(number).ok().filter(|row| *row <= last);
-    known.ok_or_else(|| PyValueError::new_err(format!("no row {number}: the table has rows 0 to {last}")))
+    known_row(table, number).map_err(PyValueError::new_err)
 }
 
 /// Values by the names of parameters: a number in SI, a truth value, or the word of a choice.

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use avastra::action::ActionTable;
-use avastra::agent::{Features, LearnerSettings, Settings, by_name};
-use avastra::cli::embedded::{Conditions, Layer, Trained, run, save_policy};
+use avastra::agent::Features;
+use avastra::cli::embedded::{Conditions, Layer, Trained, preset, run, save_policy};
 use avastra::episode::{Collision, EpisodeLog, StepLog};
 use avastra::mdp::{Observation, RewardSettings};
 use avastra::model::REPLAYS_MAX;
@@ -19,7 +19,7 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::chosen::{Trajectories, chosen, values_of};
+use crate::chosen::{Trajectories, chosen, known_row, values_of};
 use crate::info::{ended_dict, findings, info};
 use crate::space::Space;
 
@@ -201,7 +201,6 @@ impl Episodes {
         let row = self.row(row).map_err(EpisodeError::new_err)?;
         let seen = match (row, values) {
             (Some(row), Some(given)) => {
-                let row = self.known(row).map_err(EpisodeError::new_err)?;
                 let chosen = Chosen { row, values: values_of(self.run.table(), row, given)? };
                 py.detach(|| self.advance_with(&mut self.now(), &chosen))
             }
@@ -356,13 +355,9 @@ pub type Array<'py, T> = Bound<'py, PyArray1<T>>;
 const NOT_BEGUN: &str = "no episode has begun: reset first";
 
 impl Episodes {
-    /// A row as Python gives it. A negative one is refused in the words for a row beyond the last.
+    /// A row as Python gives it, if there is such a row.
     pub fn row(&self, row: Option<i64>) -> Result<Option<usize>, String> {
-        let last = self.run.table().rows().len() - 1;
-        let known = |row: i64| {
-            usize::try_from(row).map_err(|_| format!("no row {row}: the table has rows 0 to {last}"))
-        };
-        row.map(known).transpose()
+        row.map(|row| known_row(self.run.table(), row)).transpose()
     }
 
     /// The episode under way. Where a thread panicked in it, it is half stepped, so there is none any more.
@@ -378,12 +373,6 @@ impl Episodes {
     /// Begins an episode in the place of the one under way.
     pub fn begin(&self, now: &mut Option<Stepped>, seed: u64) -> Seen {
         self.view.of(now.insert(Stepped::new(&self.run.setup_of(0, seed))))
-    }
-
-    /// A row that there is.
-    fn known(&self, row: usize) -> Result<usize, String> {
-        let last = self.run.table().rows().len() - 1;
-        if row <= last { Ok(row) } else { Err(format!("no row {row}: the table has rows 0 to {last}")) }
     }
 
     /// Steps the episode under way, with values of the caller.
@@ -456,14 +445,6 @@ impl View {
         let (time_s, proc, reward) = (step.time_s, step.proc, judged.unwrap_or(step.reward));
         let (log, measures) = (step.clone(), stepped.measures()[last]);
         Step { reward, time_s, proc, log, measures, collisions, counted }
-    }
-}
-
-/// The settings that `avastra train` has by default.
-fn preset() -> LearnerSettings {
-    match by_name("ddqn").and_then(|entry| Settings::from_yaml(entry, None, "")) {
-        Some(Ok(Settings::Learning(settings))) => *settings,
-        _ => unreachable!("ddqn learns, and its preset is sound"),
     }
 }
 

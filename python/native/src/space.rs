@@ -10,6 +10,7 @@ use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 
+use crate::chosen::known_row;
 use crate::diagnostics;
 
 /// A space that was compiled: the rows of its action table, and its roads.
@@ -39,11 +40,8 @@ impl Space {
 
     /// What a row draws on a road: the values of choices, the bounds of numbers, SI.
     #[pyo3(signature = (row, road=None))]
-    fn draws(&self, row: usize, road: Option<&str>) -> PyResult<Vec<Draw>> {
-        let rows = self.table.rows();
-        let row = rows.get(row).ok_or_else(|| {
-            PyIndexError::new_err(format!("no row {row}: the table has rows 0 to {}", rows.len() - 1))
-        })?;
+    fn draws(&self, row: i64, road: Option<&str>) -> PyResult<Vec<Draw>> {
+        let row = &self.table.rows()[known_row(&self.table, row).map_err(PyIndexError::new_err)?];
         let roads = self.roads();
         let road = match road {
             None => 0,

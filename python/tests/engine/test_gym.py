@@ -136,6 +136,21 @@ class ManyWorlds(unittest.TestCase):
                 over = ended or cut
         self.assertGreater(ends, 3)
 
+    def test_a_name_may_be_a_number_of_one_row_and_a_word_of_another(self):
+        text = (ROOT / "scenarios/avastra45.ava").read_text(encoding="utf-8").replace('use "', f'use "{ROOT}/scenarios/')
+        text += "action brisk(any pick: Speed in 1 m/s .. 2 m/s) { set sky = None }\naction sided(any pick: Side) { set sky = None }\n"
+        space = avastra.Space.from_text(text.replace("count(actions) == 45", "count(actions) == 47"))
+        rows = [space.rows.index("brisk()"), space.rows.index("sided()")]
+        for mode in ("NEXT_STEP", "SAME_STEP"):
+            env = avastra.gym.VectorEnv(2, space, "corner", ads="idm", autoreset_mode=mode)
+            env.reset(seed=1)
+            over = False
+            while not over:
+                _, _, terminated, truncated, info = env.step(rows)
+                over = (terminated | truncated).any()
+                if not over:
+                    self.assertEqual([type(values["pick"]) for values in info["values"]], [float, str])
+
     def test_modes_play_the_same_episodes(self):
         def seeds(mode):
             env = avastra.gym.VectorEnv(2, SPACE, ["crossroad", "corner"], autoreset_mode=mode)

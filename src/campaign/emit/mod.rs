@@ -12,3 +12,4 @@ pub use place::{identifier, lane_point, quoted};
 pub use policy::policy_text;
 pub use safetensors::safetensors;
 pub use scenario::{Provenance, action_text, retold, scenario, unclaimed, whole};
+pub use tree::is_emitted;

@@ -39,9 +39,14 @@ fn file(policy: &Policy, space: &Space, space_path: &str, (digest, command): (St
         claims: policy.claims.as_ref().map_or(Vec::new(), fields),
         rules: policy.rules.iter().map(|rule| line(space, rule)).collect(),
     };
-    let headline = format!("Emitted by `avastra {command}`; play it with `avastra run --policy FILE`.");
     let docs = policy.docs.iter().map(|text| tree::doc(text)).collect();
-    tree::file(&headline, space, space_path, docs, ItemKind::Policy(item))
+    tree::file(
+        [command, "play it with `avastra run --policy FILE`"],
+        space,
+        space_path,
+        docs,
+        ItemKind::Policy(item),
+    )
 }
 
 /// `when ego_speed > 8.25 m/s and time == Night => pedestrian(from: Left)`.

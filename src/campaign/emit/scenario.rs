@@ -95,8 +95,8 @@ fn file(
         steps: (0..steps).map(|number| step(table, log, number)).collect(),
         expects,
     };
-    let emitted = format!("Emitted by `avastra {}`; {advice}.", source.command);
-    tree::file(&emitted, space, source.space_path, vec![tree::doc(headline)], ItemKind::Scenario(item))
+    let head = [source.command, advice];
+    tree::file(head, space, source.space_path, vec![tree::doc(headline)], ItemKind::Scenario(item))
 }
 
 /// An action as it was drawn, in one line: `drive_ahead(lane: Left, …) with { speed: 11 m/s, … }`.

@@ -9,13 +9,28 @@ use avastra_lang::syntax::ast::{
     ItemKind, Name, Number, Span, Text, Use,
 };
 
-/// A file with one item, made in a space. `headline` says which command wrote the file; `docs` are the item's.
-pub fn file(headline: &str, space: &Space, space_path: &str, docs: Vec<Doc>, kind: ItemKind) -> File {
+/// How every emitted file begins.
+const EMITTED: &str = "Emitted by `avastra ";
+
+/// Whether a text is of a file that was emitted.
+pub fn is_emitted(text: &str) -> bool {
+    text.strip_prefix("//! ").is_some_and(|line| line.starts_with(EMITTED))
+}
+
+/// A file with one item, made in a space. The first line names the command that emitted it, and what to do with it; `docs` are the
+/// item's.
+pub fn file(
+    [command, advice]: [&str; 2],
+    space: &Space,
+    space_path: &str,
+    docs: Vec<Doc>,
+    kind: ItemKind,
+) -> File {
     let item = |docs, kind| Item { docs, kind, span: Span::NONE };
     let digest = Some(Text::new(space.meaning.seal(), Span::NONE));
     let space_use = Use { path: Text::new(space_path, Span::NONE), digest, without: Vec::new() };
     File {
-        docs: vec![doc(headline)],
+        docs: vec![doc(&format!("{EMITTED}{command}`; {advice}."))],
         items: vec![
             item(Vec::new(), ItemKind::Language(digits(LANGUAGE.to_string()))),
             item(Vec::new(), ItemKind::Use(space_use)),

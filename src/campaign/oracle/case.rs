@@ -17,7 +17,7 @@ use crate::episode::at_fault;
 
 /// A hazard begins at most this long before its collision, s: longer than any reaction or braking, because
 /// ambient traffic may have appeared long before.
-const LOOK_BACK_S: f64 = 15.0;
+pub(super) const LOOK_BACK_S: f64 = 15.0;
 
 /// A finding of an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

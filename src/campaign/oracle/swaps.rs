@@ -9,7 +9,8 @@
 //!
 //! That a failure vanishes is no proof of a fault: a brake that acts twice as strongly saves sound drivers, too. So a cause needs a second
 //! sign, which is measured. A car that is not there is shown where the way was free ([`Response`]): how late does the first command
-//! change, and how strongly does it brake? And how far beside its route did it drive? [`Swaps::conclude`] draws the conclusion.
+//! change, and how strongly does it brake? And how far beside its route did it drive? Perception alone has no second sign.
+//! [`Swaps::conclude`] draws the conclusion.
 //!
 //! Left out: errors from before the obstacle appeared, and swaps of two things.
 
@@ -25,7 +26,7 @@ use avastra_world::sim::{
     DT_S, EgoMotion, Sensed, SensedObject, SignalColour, VehicleParameters, pedal_acceleration_mps2,
 };
 
-use super::case::{Case, Fate, Found, What};
+use super::case::{Case, Fate, Found, LOOK_BACK_S, What};
 use super::cause::{AGAIN_MIN, again, unchanged};
 use super::evidence::{Chance, Comparison, is_told_apart};
 use super::recurrence::other_reactions;
@@ -40,7 +41,8 @@ const LATE_S: f64 = 0.4;
 const PERCEIVES_S: f64 = 0.3;
 /// Braking with less than this part of what is needed is weak.
 const WEAK: f64 = 0.75;
-/// The phantom stands where so much braking is needed, m/s².
+/// The phantom, a car of this length, m, stands a metre beyond where so much braking is needed, m/s².
+const PHANTOM_M: f64 = 4.6;
 const NEEDED_MPS2: f64 = 5.0;
 /// It is shown at this speed and above, m/s.
 const FAST_MPS: f64 = 5.0;
@@ -57,8 +59,6 @@ const BESIDE_M_MAX: f64 = 1.5;
 const BESIDE_S: f64 = 3.0;
 const BESIDE_MPS: f64 = 3.0;
 const STRAIGHT_M: f64 = 20.0;
-/// Lights are looked at from so long before the failure on, s.
-const LIGHTS_S: f64 = 15.0;
 /// A crash because of a light happens at most so long after the light was passed, s.
 const JUNCTION_S: f64 = 6.0;
 /// What makes up for a delay that could not be measured, s.
@@ -73,7 +73,7 @@ pub struct Swaps {
     /// From when on things were changed, s.
     pub from_s: f64,
     pub swaps: Vec<Swap>,
-    /// `None` if the way was nowhere free.
+    /// `None` if the way was nowhere free, or the driving system failed at the sight.
     pub response: Option<Response>,
     /// Its steady place to the left of its route where that is straight, m; 0 if it was not steady.
     pub offset_m: f64,
@@ -130,8 +130,10 @@ pub enum Change {
 pub struct Response {
     /// When they were shown, each in a drive of its own, s.
     pub shown_s: f64,
-    /// Until the drive changed because of a standing car, s; `None` if it never did.
+    /// Until the drive changed because of a standing car, s; `None` if it did not within 4 s.
     pub late_s: Option<f64>,
+    /// More than this is late, s: one that perceives others itself may take longer.
+    pub late_s_max: f64,
     /// The hardest braking after that, as a part of what was needed; `None` if it drove around the car.
     pub braking: Option<f64>,
     /// Whether the drive changed because of one like the road user that the failure is about; `None` if it is about none.
@@ -276,12 +278,8 @@ impl Swaps {
     }
 
     fn is_late(&self) -> bool {
-        let told_speeds = |response: Response| response.minds_speed.is_some();
-        let late_s = |response: Response| {
-            let allowed_s = if told_speeds(response) { LATE_S } else { LATE_S + PERCEIVES_S };
-            response.late_s.filter(|late_s| *late_s > allowed_s)
-        };
-        self.response.and_then(late_s).is_some()
+        let is_late = |response: Response| response.late_s.is_some_and(|late_s| late_s > response.late_s_max);
+        self.response.is_some_and(is_late)
     }
 
     fn is_weak(&self) -> bool {
@@ -353,19 +351,13 @@ impl<'a> Asked<'a> {
         let offset_m = self.offset_m();
         let mut swaps: Vec<Swap> =
             self.changes(response, offset_m).into_iter().map(|change| self.swap(change)).collect();
+        // Only what could make up for a fault is asked again with other noise.
         let asked = |swap: &&mut Swap| {
-            let is_asked = matches!(
+            let makes_up = !matches!(
                 swap.change,
-                Change::Ahead(_)
-                    | Change::Nearer
-                    | Change::Larger
-                    | Change::Mirrored
-                    | Change::Braking(_)
-                    | Change::Steering(_)
-                    | Change::Truth
-                    | Change::Prompt
+                Change::Without(_) | Change::WithoutAll | Change::Standing | Change::Red | Change::Green
             );
-            is_asked && swap.fate == Fate::Vanished
+            makes_up && swap.fate == Fate::Vanished
         };
         let tries = swaps.iter_mut().filter(asked).count();
         let mut chance = None;
@@ -448,7 +440,7 @@ impl<'a> Asked<'a> {
     /// From when on a thing is changed, s: a light may have been passed before its obstacle appeared.
     fn begins_s(&self, change: Change) -> f64 {
         match change {
-            Change::Red | Change::Green => self.from_s.min((self.found_s - LIGHTS_S).max(0.0)),
+            Change::Red | Change::Green => (self.found_s - LOOK_BACK_S).max(0.0),
             _ => self.from_s,
         }
     }
@@ -532,13 +524,15 @@ impl<'a> Asked<'a> {
         })?;
         let tick = &self.ticks[free];
         let shown_s = tick.sensed.time_s;
-        let station_m = tick.station_m + car.rear_axle_to_front_m + away_m(tick.sensed.ego.speed_mps) + 2.3;
+        let speed_mps = tick.sensed.ego.speed_mps;
+        let away_m = away_m(speed_mps);
+        let station_m = tick.station_m + car.rear_axle_to_front_m + away_m + PHANTOM_M / 2.0;
         let car_there = SensedObject {
             id: 0,
             body: Body::Sedan,
             pose: route.path.pose_at(station_m),
             velocity_mps: Vec2::zeros(),
-            length_m: 4.6,
+            length_m: PHANTOM_M,
             width_m: 1.9,
             height_m: 1.5,
             visible_fraction: 1.0,
@@ -554,9 +548,8 @@ impl<'a> Asked<'a> {
             return None;
         }
         // Nearer, some drivers brake as hard as they can for either.
-        let farther_m = station_m + away_m(tick.sensed.ego.speed_mps);
-        let farther = SensedObject { pose: route.path.pose_at(farther_m), ..car_there };
-        let velocity_mps = farther.pose.forward() * tick.sensed.ego.speed_mps;
+        let farther = SensedObject { pose: route.path.pose_at(station_m + away_m), ..car_there };
+        let velocity_mps = farther.pose.forward() * speed_mps;
         // What differs much later is no reaction.
         let reacts = |motions: &[EgoMotion]| {
             self.differs_s(motions).filter(|differs_s| differs_s - shown_s <= EFFECT_S)
@@ -570,7 +563,8 @@ impl<'a> Asked<'a> {
             let there = SensedObject { pose, velocity_mps, visible_fraction, ..*its_like };
             Some(reacts(&shown(there)).is_some())
         });
-        let none = Response { shown_s, late_s: None, braking: None, minds_its_like, minds_speed };
+        let late_s_max = if self.is_told_speeds() { LATE_S } else { LATE_S + PERCEIVES_S };
+        let none = Response { shown_s, late_s: None, late_s_max, braking: None, minds_its_like, minds_speed };
         let Some(differs_s) = reacts(&motions) else { return Some(none) };
         // A command acts in the tick after it.
         let late_s = (differs_s - shown_s - DT_S).max(0.0);
@@ -581,8 +575,7 @@ impl<'a> Asked<'a> {
             (offset_m - tick.offset_m).abs() > 0.7
         });
         // It may stop just before the car.
-        let speed_mps = tick.sensed.ego.speed_mps;
-        let needed_mps2 = speed_mps * speed_mps / (2.0 * away_m(speed_mps));
+        let needed_mps2 = speed_mps * speed_mps / (2.0 * away_m);
         let possible_mps2 = -pedal_acceleration_mps2(0.0, 100.0) * tick.sensed.conditions.friction;
         let needed_mps2 = needed_mps2.min(possible_mps2);
         let braking = (!goes_around).then_some(hardest_mps2 / needed_mps2);

@@ -46,7 +46,7 @@ fn drive_text(swap: &Swap) -> String {
 }
 
 fn response_text(swaps: &Swaps) -> String {
-    let Some(Response { shown_s, late_s, braking, minds_its_like, minds_speed }) = swaps.response else {
+    let Some(Response { shown_s, late_s, braking, minds_its_like, minds_speed, .. }) = swaps.response else {
         return "\n\nIts reactions were not measured: there was no straight and free way at 5 m/s, or the program failed.".to_owned();
     };
     let mut text = format!("\n\nIt was told at {shown_s:.1} s of a car in its way that was not there:");
@@ -84,52 +84,44 @@ pub fn sentence(swaps: &Swaps) -> String {
     let noun = swaps.noun;
     let late_s = swaps.response.and_then(|response| response.late_s).unwrap_or_default();
     let braking = swaps.response.and_then(|response| response.braking).unwrap_or_default();
-    match swaps.hangs_on {
-        Some(HangsOn::IgnoredLights) => {
-            format!(
-                "the {noun} hangs on ignored lights: it passed one that was not green, and drives the same whatever lights show"
-            )
+    let Some(hangs_on) = swaps.hangs_on else {
+        return format!("nothing is named that the {noun} hangs on: {}", lack_text(swaps));
+    };
+    let (what, why) = match hangs_on {
+        HangsOn::IgnoredLights => (
+            "ignored lights",
+            "it passed one that was not green, and drives the same whatever lights show".to_owned(),
+        ),
+        HangsOn::IgnoredRoadUser => (
+            "an ignored road user",
+            "it drives the same if it is not told of it, and does nothing about one like it in its way"
+                .to_owned(),
+        ),
+        HangsOn::IgnoredSpeeds => {
+            ("ignored speeds", "it drives the same if it is told that others stand".to_owned())
         }
-        Some(HangsOn::IgnoredRoadUser) => {
-            format!(
-                "the {noun} hangs on an ignored road user: it drives the same if it is not told of it, and does nothing about one like it in its way"
-            )
+        HangsOn::Delay => (
+            "a delay",
+            format!("it reacts after {late_s:.2} s, and told of things so long before, there is no {noun}"),
+        ),
+        HangsOn::Latency => ("the latency of the profile", format!("obeyed at once, there is no {noun}")),
+        HangsOn::Perception => ("what is perceived", format!("told the truth, there is no {noun}")),
+        HangsOn::Brakes => {
+            let percent = 100.0 * braking;
+            let why = format!(
+                "it brakes with {percent:.0} % of what is needed, and with stronger brakes there is no {noun}"
+            );
+            ("the brakes", why)
         }
-        Some(HangsOn::IgnoredSpeeds) => {
-            format!("the {noun} hangs on ignored speeds: it drives the same if it is told that others stand")
+        HangsOn::Steering => {
+            ("the steering", format!("it drives beside its route, and turned back there is no {noun}"))
         }
-        Some(HangsOn::Delay) => {
-            format!(
-                "the {noun} hangs on a delay: it reacts after {late_s:.2} s, and told of things so long before, there is no {noun}"
-            )
+        HangsOn::Sides => ("left and right", format!("with both exchanged there is no {noun}")),
+        HangsOn::Room => {
+            ("how much room it keeps", format!("told of others nearer or larger, there is no {noun}"))
         }
-        Some(HangsOn::Latency) => {
-            format!("the {noun} hangs on the latency of the profile: obeyed at once, there is no {noun}")
-        }
-        Some(HangsOn::Perception) => {
-            format!("the {noun} hangs on what is perceived: told the truth, there is no {noun}")
-        }
-        Some(HangsOn::Brakes) => {
-            format!(
-                "the {noun} hangs on the brakes: it brakes with {:.0} % of what is needed, and with stronger brakes there is no {noun}",
-                100.0 * braking
-            )
-        }
-        Some(HangsOn::Steering) => {
-            format!(
-                "the {noun} hangs on the steering: it drives beside its route, and turned back there is no {noun}"
-            )
-        }
-        Some(HangsOn::Sides) => {
-            format!("the {noun} hangs on left and right: with both exchanged there is no {noun}")
-        }
-        Some(HangsOn::Room) => {
-            format!(
-                "the {noun} hangs on how much room it keeps: told of others nearer or larger, there is no {noun}"
-            )
-        }
-        None => format!("nothing is named that the {noun} hangs on: {}", lack_text(swaps)),
-    }
+    };
+    format!("the {noun} hangs on {what}: {why}")
 }
 
 /// Why nothing is named.

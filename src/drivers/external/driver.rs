@@ -77,6 +77,14 @@ struct Wants {
     names: bool,
 }
 
+impl Wants {
+    fn of(program: &Program) -> Wants {
+        let words = program.identified().map_or(&[][..], |identity| &identity.wants);
+        let wants = |group: &str| words.iter().any(|word| word == group);
+        Wants { motion: wants("motion"), conflicts: wants("conflicts"), names: wants("names") }
+    }
+}
+
 /// What was told of an object.
 #[derive(Debug, Clone, Copy)]
 struct Known {
@@ -141,11 +149,7 @@ impl External {
             observer: program.settings().shows_perceived().then(observer),
             truth_from_s: f64::INFINITY,
             prompt_from_s: f64::INFINITY,
-            wants: Wants {
-                motion: program.wants("motion"),
-                conflicts: program.wants("conflicts"),
-                names: program.wants("names"),
-            },
+            wants: Wants::of(program),
             before: Vec::new(),
             follower: Follower::new(scene),
             exchanges: Vec::new(),

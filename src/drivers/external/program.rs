@@ -214,13 +214,12 @@ impl Program {
         Attached { identity, settings: self.settings.clone(), is_recorded: false }
     }
 
-    /// Whether the program asks for a group of fields. It is started to find out, if it was not yet.
-    pub(super) fn wants(&self, group: &str) -> bool {
+    /// What the program says of itself. It is started once to find out, if it never was; if it cannot be, the first question says why.
+    pub(super) fn identified(&self) -> Option<&Identity> {
         if self.identity.get().is_none() && self.may_start {
-            // If it cannot be started, the first question says why.
             let _ = self.start();
         }
-        self.identity.get().is_some_and(|identity| identity.wants.iter().any(|word| word == group))
+        self.identity.get()
     }
 
     /// A process that no episode uses; one that has the map, if there is any.

@@ -10,16 +10,15 @@ use serde_json::Value;
 
 use crate::check::names::docs;
 use crate::check::policy::lines::rules;
-use crate::model::policy::{Net, Policy, PolicyClaims, PolicyOrigin, record, seal, weights_from_lines};
+use crate::model::policy::{
+    Net, Policy, PolicyClaims, PolicyOrigin, WEIGHT_MAX, record, seal, weights_from_lines,
+};
 use crate::model::{Space, code};
 use crate::syntax::ast::{Field, Span};
 use crate::syntax::{Diagnostic, ast, settings_mistake};
 
 /// Most episodes on each road that a policy may claim; `avastra train` claims 15.
 const EPISODES_MAX: u64 = 10_000;
-
-/// Largest weight, in absolute value. Trained ones stay below 100; larger ones than this overflow in a few layers.
-const WEIGHT_MAX: f32 = 10_000.0;
 
 /// The policy of a file, checked against the space that it uses. `text` is what the tree was read from.
 ///

@@ -14,7 +14,7 @@ pub use plain::expression;
 pub(crate) use plain::record;
 pub use seal::seal;
 pub use variable::{VARIABLES, Variable, VariableKind, variable_index};
-pub use weights::{weights_from_lines, weights_to_lines};
+pub use weights::{WEIGHT_MAX, weights_from_lines, weights_to_lines};
 
 use serde_json::{Map, Value};
 

@@ -3,6 +3,9 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
+/// Largest weight, in absolute value. Trained ones stay below 100; larger ones than this overflow in a few layers.
+pub const WEIGHT_MAX: f32 = 10_000.0;
+
 /// Bytes of one line: 96 characters, which stay on a line of a formatted file.
 const LINE_BYTES: usize = 72;
 
