@@ -8,9 +8,9 @@ binary=${AVASTRA:-$root/target/release/avastra}
 [ -n "${AVASTRA:-}" ] || (cd "$root" && cargo build --release --quiet)
 
 cd "$root"
-# One picture a line: its scenario, and the moments of its panels in s.
-while read -r name moments; do
-  "$binary" render "docs/pictures/$name.ava" --at "$moments" --out "docs/pictures/$name.svg" < /dev/null
+# One picture a line: its name, the moments of its panels in s, and its scenario, if that is no file of the same name here.
+while read -r name moments scenario; do
+  "$binary" render "${scenario:-docs/pictures/$name.ava}" --at "$moments" --out "docs/pictures/$name.svg" < /dev/null
 done <<END
 drive_behind 0.02,6
 overtake 0.02,4

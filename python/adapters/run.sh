@@ -33,7 +33,7 @@ if ! cmp -s "$here/$name/requirements.txt" "$venv/installed"; then
     "$python" -m venv "$venv"
     "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$here/$name/requirements.txt"
     packages=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
-    echo "$root/python" >"$packages/avastra.pth"
+    printf '%s\n' "$root/python" "$here" >"$packages/avastra.pth"
     # What pip cannot install, an adapter fetches itself, into the folder that it is told.
     [ ! -f "$here/$name/install.py" ] || "$venv/bin/python" "$here/$name/install.py" "$venv"
     cp "$here/$name/requirements.txt" "$venv/installed"

@@ -379,15 +379,19 @@ fn the_picture_of_the_readme_is_of_its_scenario() {
 fn the_pictures_of_the_book_are_of_their_scenarios() {
     let script = std::fs::read_to_string(root().join("docs/pictures/make.sh")).expect("it is shipped");
     let listed = script.lines().skip_while(|line| !line.ends_with("<<END")).skip(1);
-    let drawn: BTreeMap<&str, &str> =
-        listed.take_while(|line| *line != "END").filter_map(|line| line.split_once(' ')).collect();
+    let drawn: BTreeMap<&str, Vec<&str>> = listed
+        .take_while(|line| *line != "END")
+        .filter_map(|line| line.split_once(' '))
+        .map(|(name, rest)| (name, rest.split(' ').collect()))
+        .collect();
     let kept = files_below(root().join("docs/pictures"), "svg");
     let kept: Vec<_> = kept.iter().filter_map(|path| path.file_stem()?.to_str()).collect();
     assert_eq!(kept, drawn.keys().copied().collect::<Vec<_>>());
     let read = |path: &Path| std::fs::read_to_string(path).expect("it is a text");
     let pages: String = files_below(root().join("docs"), "md").iter().map(|page| read(page)).collect();
-    for (name, moments) in drawn {
-        let scenario = format!("docs/pictures/{name}.ava");
+    for (name, rest) in drawn {
+        let moments = rest[0];
+        let scenario = rest.get(1).map_or(format!("docs/pictures/{name}.ava"), |path| (*path).to_owned());
         // Some claim who had priority.
         done(&["replay", &scenario]);
         let svg = done(&["render", &scenario, "--at", moments, "--out", "-"]);

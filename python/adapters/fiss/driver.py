@@ -18,12 +18,14 @@ plan that follows passes the line. That is its own mistake, and nothing here pre
 import dataclasses
 import math
 import sys
+import types
 
 import avastra
+import careful
 import fiss_planner as fiss
 import numpy as np
 
-PLANNERS = ("fop", "fop_plus", "fiss", "fiss_plus")
+PLANNERS = ("fop", "fop_plus", "fiss", "fiss_plus", "careful")
 #: Time between points of predictions and trajectories, s; the package's own.
 DT = 0.1
 #: Beyond the longest sampled trajectory predictions go on for this, s; as the package's adapters have it.
@@ -47,7 +49,7 @@ class Fiss(avastra.Driver):
 
     def __init__(self, planner):
         self.planner = planner
-        self.name = f"FISS {planner}"
+        self.name = "careful planner as FISS" if planner == "careful" else f"FISS {planner}"
 
     def init(self, init):
         self.vehicle = init.vehicle
@@ -58,7 +60,8 @@ class Fiss(avastra.Driver):
         self.params.max_accel, self.params.max_decel = init.vehicle.max_accel, init.vehicle.max_decel
         self.params.max_steer, self.params.max_steer_rate = init.vehicle.max_steer, init.vehicle.max_steer_rate
         self.config = fiss.LocalPlannerConfig()
-        self.config.planner.type = fiss.planner_type_from_string(self.planner)
+        if self.planner != "careful":
+            self.config.planner.type = fiss.planner_type_from_string(self.planner)
         self.config.planner.collision.ignore_rear_in_lane = True
         self.horizon = self.config.planner.sampling.max_t + AFTER
 
@@ -73,7 +76,7 @@ class Fiss(avastra.Driver):
     def reset(self, reset):
         self.way = avastra.Way(self.vehicle, self.roads, reset)
         # Made anew: it stitches plans, and remembers its lane.
-        self.local = fiss.LocalPlanner(self.config, self.params)
+        self.local = Careful(self.params, self.way) if self.planner == "careful" else fiss.LocalPlanner(self.config, self.params)
         #: The last plan by its times: the vehicle's middle, and the point that was made of it.
         self.last = {}
         self.local.set_map(self.network, [self.numbers[lane.id] for lane in reset.route.lanes])
@@ -134,6 +137,40 @@ class Fiss(avastra.Driver):
                                                other.length, other.width, self.horizon, DT)
         heading = math.atan2(other.vy, other.vx) if other.speed > WALKS else other.heading
         return fiss.predict_constant_velocity(other.id, other.x, other.y, heading, other.speed, other.length, other.width, self.horizon, DT)
+
+
+class Careful:
+    """The careful planner in place of `fiss.LocalPlanner`: it reads its obstacles and stop lines."""
+
+    def __init__(self, params, way):
+        self.params, self.path, self.active = params, way.path, set()
+
+    def set_map(self, network, _):
+        self.network = network
+
+    def set_stop_line_active(self, number, is_active):
+        (self.active.add if is_active else self.active.discard)(number)
+
+    def step(self, _, ego, obstacles, wanted):
+        params, station = self.params, self.path.project(ego.x, ego.y).station
+        vehicle = careful.Vehicle(params.length, params.width, ego.v, params.max_accel, params.max_decel)
+        others = [read(obstacle) for obstacle in obstacles]
+        others += [self.barrier(line) for line in self.network.stop_lines if line.id in self.active]
+        way = careful.way(self.path, station)
+        plan = careful.driven(way, ego.v, careful.acceleration(vehicle, way, others, wanted), DT, 3.0)
+        x, y, yaw, v, a = plan.T
+        trajectory = types.SimpleNamespace(t=DT * np.arange(len(plan)), x=x, y=y, yaw=yaw, v=v, a=a, s_d=v)
+        return types.SimpleNamespace(trajectory=trajectory, fallback=False, degraded=False, emergency=False)
+
+    def barrier(self, line):
+        center = avastra.Path([(x, y) for x, y in np.asarray(self.network.lane(line.lane_id).centerline)[:, :2]])
+        return careful.moving(*center.at(line.s + 0.5), 0.0, 0.0, 1.0, 3.0)
+
+
+def read(obstacle):
+    """What an obstacle of the package says."""
+    poses = [(state.x, state.y, state.yaw) for state in obstacle.prediction]
+    return careful.predicted(DT * np.arange(len(poses)), poses, obstacle.length, obstacle.width)
 
 
 def network(map, numbers, lines):

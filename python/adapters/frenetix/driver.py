@@ -13,8 +13,10 @@ the vehicle is farther than `ASTRAY` from it.
 """
 
 import math
+import sys
 
 import avastra
+import careful
 import frenetix
 import numpy as np
 from frenetix.trajectory_functions import FillCoordinates
@@ -169,6 +171,21 @@ class Frenetix(avastra.Driver):
         return not apart.all()
 
 
+class Careful(Frenetix):
+    """The careful planner, which reads the predicted boxes."""
+
+    name = "careful planner as Frenetix"
+
+    def best(self, now, wanted, station, boxes, objects):
+        speed, middle = float(now[3]), self.vehicle.rear_axle_to_centre
+        vehicle = careful.Vehicle(self.vehicle.length, self.vehicle.width, speed, self.vehicle.max_accel, self.vehicle.max_decel, middle)
+        way = careful.way(self.way.path, station)
+        others = [careful.predicted(DT * np.arange(len(poses)), poses, 2.0 * length, 2.0 * width) for poses, length, width in boxes]
+        accel = careful.acceleration(vehicle, way, others, wanted)
+        plan = careful.driven(way, speed, accel, DT, HORIZON)
+        return np.column_stack([plan, np.zeros(len(plan))])
+
+
 def reference(path):
     """The route for the core: longer at both ends, because its frame ends where its line does, and smooth."""
     before = [path.at(-float(back))[:2] for back in range(20, 0, -1)]
@@ -190,4 +207,4 @@ def spread(other):
 
 
 if __name__ == "__main__":
-    avastra.serve(Frenetix)
+    avastra.serve({"": Frenetix, "careful": Careful}[sys.argv[1] if len(sys.argv) > 1 else ""])

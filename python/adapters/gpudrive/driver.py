@@ -19,6 +19,7 @@ import pathlib
 import sys
 
 import avastra
+import careful
 import numpy as np
 
 #: How far ahead on the route the goal is, m. Ours, by trial: with 20 m it leaves the road more often.
@@ -53,9 +54,14 @@ class GpuDrive(avastra.Driver):
     version = "3.0.0"
     answer = "control"
 
+    def __init__(self, is_careful=False):
+        self.is_careful = is_careful
+        if is_careful:
+            self.name = "careful planner as GPUDrive policy"
+
     def init(self, init):
         self.vehicle = init.vehicle
-        self.policy = Policy(pathlib.Path(sys.prefix) / "gpudrive_weights.bin")
+        self.policy = Careful() if self.is_careful else Policy(pathlib.Path(sys.prefix) / "gpudrive_weights.bin")
 
     def map(self, map):
         self.roads = map
@@ -67,9 +73,7 @@ class GpuDrive(avastra.Driver):
 
     def step(self, step):
         accel, steer = self.policy.act(*self.observed(step))
-        # Its car turns about its middle, as if its length were its wheelbase.
-        slip = math.tanh(0.5 * math.tan(steer))
-        curvature = math.cos(slip) * math.tan(steer) / (SHRUNK * self.vehicle.length)
+        curvature = curved(steer, SHRUNK * self.vehicle.length)
         allowed = self.way.wanted_speed(step) - step.ego.speed
         reason = "policy" if ACCEL_SHARE * accel <= allowed else "limit or line"
         return avastra.Control(min(ACCEL_SHARE * accel, allowed), math.atan(self.vehicle.wheelbase * curvature), avastra.Internal(reason=reason))
@@ -137,6 +141,44 @@ class Policy:
     def layer(self, name, values):
         weights, biases = self.layers[name]
         return values.astype(np.float32) @ weights.T + biases
+
+
+class Careful:
+    """The careful planner in place of the policy: it reads the observation, and takes one of the policy's actions."""
+
+    def forget(self):
+        pass
+
+    def act(self, own, cars, _):
+        x, y = DISTANCE * own[:2]
+        speed, width, length = SPEED * own[2], WIDTH / SHRUNK * own[3], LENGTH / SHRUNK * own[4]
+        curvature = 2.0 * y / (x**2 + y**2)
+        vehicle = careful.Vehicle(length, width, speed, ACCEL_SHARE * ACCELS[-1], -ACCEL_SHARE * ACCELS[0])
+        accel = careful.acceleration(vehicle, arc(curvature, math.hypot(x, y)), [read(car) for car in cars if car.any()], math.inf)
+        steer = STEERS[np.argmin([abs(curved(steer, SHRUNK * length) - curvature) for steer in STEERS])]
+        return ACCELS[np.flatnonzero(ACCEL_SHARE * ACCELS <= accel + 1e-6).max(initial=0)], steer
+
+
+def read(car):
+    """What a row of the observation says of a car, in the vehicle's frame."""
+    x, y, width, length, cos, sin, speed = car
+    heading, speed = math.atan2(sin, cos), SPEED * speed
+    return careful.moving(DISTANCE * x, DISTANCE * y, heading, speed * math.cos(heading), speed * math.sin(heading), LENGTH / SHRUNK * length,
+                          WIDTH / SHRUNK * width)
+
+
+def arc(curvature, length):
+    """A way that bends up to a length, and goes straight on; rows of station, x, y, heading."""
+    ways = np.arange(0.0, 80.0, 0.5)
+    headings = curvature * np.minimum(ways, length)
+    x, y = (np.append(0.0, np.cumsum(0.5 * part(headings[:-1]))) for part in (np.cos, np.sin))
+    return np.column_stack([ways, x, y, headings])
+
+
+def curved(steer, length):
+    """The curvature that an angle of the wheels makes, 1/m: its car turns about its middle, as if its length were its wheelbase."""
+    slip = math.tanh(0.5 * math.tan(steer))
+    return math.cos(slip) * math.tan(steer) / length
 
 
 def sigmoid(values):
@@ -211,4 +253,4 @@ def contains(outline, points):
 
 
 if __name__ == "__main__":
-    avastra.serve(GpuDrive)
+    avastra.serve(lambda: GpuDrive(sys.argv[1:] == ["careful"]))

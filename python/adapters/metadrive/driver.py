@@ -16,8 +16,10 @@ lights and crossing traffic are new to it.
 import importlib.util
 import math
 import pathlib
+import sys
 
 import avastra
+import careful
 import numpy as np
 
 RAYS, REACH = 240, 50.0
@@ -65,16 +67,19 @@ class Expert(avastra.Driver):
         self.heading = reset.start.heading
 
     def step(self, step):
-        seen = self.observed(step)
-        value = seen
-        for index, (kernel, bias) in enumerate(self.layers):
-            value = value @ kernel + bias
-            value = np.tanh(value) if index < 2 else value
-        turn, pedal = (float(min(max(action, -1.0), 1.0)) for action in value[:2])
+        turn, pedal = (float(min(max(action, -1.0), 1.0)) for action in self.acted(self.observed(step)))
         self.actions = [self.actions[1], (turn, pedal)]
         self.heading = step.ego.heading
         curvature = math.tan(turn * STEER_MAX) / WHEELBASE
         return avastra.Control(self.accel(pedal, step.ego), math.atan(self.vehicle.wheelbase * curvature))
+
+    def acted(self, seen):
+        """The expert's actions: wheels and pedal, both in [-1, 1]."""
+        value = seen
+        for index, (kernel, bias) in enumerate(self.layers):
+            value = value @ kernel + bias
+            value = np.tanh(value) if index < 2 else value
+        return value[:2]
 
     def accel(self, pedal, ego):
         """What MetaDrive's car makes of a pedal, m/s²: its brakes lock almost at a touch."""
@@ -144,6 +149,55 @@ class Expert(avastra.Driver):
         return numbers + [0.0] * (4 * OTHERS - len(numbers))
 
 
+class Careful(Expert):
+    """The careful planner in the expert's place: it reads the 275 observations. Rays say where something is, but not how it moves."""
+
+    name = "careful planner as MetaDrive expert"
+
+    def acted(self, seen):
+        speed, half = (seen[3] * (SPEED_MAX_KMH + 1.0) - 1.0) / 3.6, LANE_WIDTH_MAX / 2.0
+        way = bent(seen[9:19], LANES_WIDTH_MAX * (seen[0] + seen[1]), (2.0 * seen[8] - 1.0) * half, math.asin(2.0 * seen[2] - 1.0))
+        vehicle = careful.Vehicle(self.vehicle.length, self.vehicle.width, speed, 4.0 * ENGINE / MASS, min(FRICTION_DECEL, self.vehicle.max_decel))
+        accel = careful.acceleration(vehicle, way, met(seen[35:]) + known(seen[19:35], speed), SPEED_MAX_KMH / 3.6)
+        ahead = way[min(int((4.0 + 0.5 * speed) / 0.5), len(way) - 1)]
+        curvature = 2.0 * ahead[2] / (ahead[1] ** 2 + ahead[2] ** 2)
+        pedal = accel * MASS / (4.0 * ENGINE) if accel >= 0.0 else accel * MASS * PHYSICS_STEP / (4.0 * BRAKE)
+        return math.atan(WHEELBASE * curvature) / STEER_MAX, pedal
+
+
+def bent(navigation, width, aside, turned):
+    """The way through two stretches, in the vehicle's frame with y to the left; `aside` is how far its beginning lies to the left."""
+    ways, bends, left = np.arange(0.0, 80.0, 0.5), [], 0.0
+    for along, across, radius, clockwise, _ in navigation.reshape(2, 5):
+        radius *= RADIUS_MAX + width
+        reach = left + CHECKPOINT_REACH * math.hypot(2.0 * along - 1.0, 2.0 * across - 1.0) if not bends else math.inf
+        bends.append((left, reach, (1.0 - 2.0 * clockwise) / radius if radius > 1.0 else 0.0))
+        left = reach
+    curvatures = np.select([(ways >= begin) & (ways < end) for begin, end, _ in bends], [bend for _, _, bend in bends])
+    headings = turned + np.append(0.0, np.cumsum(0.5 * curvatures[:-1]))
+    x, y = (np.append(0.0, np.cumsum(0.5 * part(headings[:-1]))) for part in (np.cos, np.sin))
+    return np.column_stack([ways, x - aside * math.sin(turned), y + aside * math.cos(turned), headings])
+
+
+def met(shares):
+    """What the rays meet, as small things that stand."""
+    hits = np.flatnonzero(shares < 1.0)
+    angles = -hits * 2.0 * math.pi / RAYS
+    return [careful.moving(REACH * share * math.cos(angle), REACH * share * math.sin(angle), 0.0, 0.0, 0.0, 0.5, 0.5)
+            for share, angle in zip(shares[hits], angles)]
+
+
+def known(numbers, speed):
+    """The vehicles whose velocity is known, of a usual size."""
+    found = []
+    for along, aside, along_kmh, aside_kmh in numbers.reshape(OTHERS, 4):
+        if (along, aside) != (0.0, 0.0):
+            vx, vy = (2.0 * along_kmh - 1.0) * SPEED_MAX_KMH / 3.6 + speed, -(2.0 * aside_kmh - 1.0) * SPEED_MAX_KMH / 3.6
+            heading = math.atan2(vy, vx) if math.hypot(vx, vy) > 0.5 else 0.0
+            found.append(careful.moving((2.0 * along - 1.0) * REACH, -(2.0 * aside - 1.0) * REACH, heading, vx, vy, 4.8, 1.9))
+    return found
+
+
 class Frame:
     """The ego vehicle's own frame: its centre, ahead and to the right."""
 
@@ -205,4 +259,4 @@ def rays(frame, boxes):
 
 
 if __name__ == "__main__":
-    avastra.serve(Expert)
+    avastra.serve({"": Expert, "careful": Careful}[sys.argv[1] if len(sys.argv) > 1 else ""])

@@ -28,6 +28,7 @@ import tempfile
 import typing
 
 import avastra
+import careful
 import libsumo
 import numpy as np
 
@@ -109,11 +110,18 @@ class Sumo(avastra.Driver):
 
     def step(self, step):
         ego, front = step.ego, step.ego.route_s + self.vehicle.rear_axle_to_front
-        sumo_front = libsumo.vehicle.getLanePosition("ego")
-        libsumo.vehicle.setPreviousSpeed("ego", ego.speed)
         limit = max(min(self.way.speed(ego.route_s), self.passing(step, front)), 0.1)
-        libsumo.lane.setMaxSpeed("way_0", limit)
         leaders = in_order(self.in_the_way(step, front))
+        reached = min(self.followed(ego.speed, limit, leaders), max(limit, ego.speed - LIMIT_DECEL * self.period))
+        accel = (reached - ego.speed) / self.period
+        reason = f"follow {leaders[0].name}" if leaders else "free"
+        return avastra.Acceleration(accel, avastra.Internal(reason=reason))
+
+    def followed(self, speed, limit, leaders):
+        """The speed that SUMO's vehicle has after a step, m/s."""
+        sumo_front = libsumo.vehicle.getLanePosition("ego")
+        libsumo.vehicle.setPreviousSpeed("ego", speed)
+        libsumo.lane.setMaxSpeed("way_0", limit)
         # SUMO follows in the order in which vehicles came to the lane: where two have passed each other, as a car passes a
         # line that holds, all are put there anew.
         stay = [leader.name for leader in leaders if leader.name in self.ahead]
@@ -126,10 +134,7 @@ class Sumo(avastra.Driver):
             self.put(leader, sumo_front, is_new=leader.name not in stay)
         self.ahead = [leader.name for leader in leaders]
         libsumo.simulationStep()
-        reached = min(libsumo.vehicle.getSpeed("ego"), max(limit, ego.speed - LIMIT_DECEL * self.period))
-        accel = (reached - ego.speed) / self.period
-        reason = f"follow {self.ahead[0]}" if self.ahead else "free"
-        return avastra.Acceleration(accel, avastra.Internal(reason=reason))
+        return libsumo.vehicle.getSpeed("ego")
 
     def in_the_way(self, step, front):
         """Everything on the strip ahead."""
@@ -228,6 +233,21 @@ class Sumo(avastra.Driver):
         if self.running:
             libsumo.close()
         self.folder.cleanup()
+
+
+class Careful(Sumo):
+    """The careful planner, which reads what is put on SUMO's lane."""
+
+    def __init__(self):
+        super().__init__("IDM")
+        self.name = "careful planner as SUMO"
+
+    def followed(self, speed, limit, leaders):
+        vehicle = careful.Vehicle(self.vehicle.length, self.vehicle.width, speed, self.vehicle.max_accel, self.vehicle.max_decel)
+        way = np.array([(station, station, 0.0, 0.0) for station in (0.0, REACH)])
+        others = [careful.moving(leader.gap + (self.vehicle.length + leader.length) / 2.0, 0.0, 0.0, leader.speed, 0.0, leader.length, 1.0)
+                  for leader in leaders]
+        return max(speed + careful.acceleration(vehicle, way, others, limit) * self.period, 0.0)
 
 
 class Lanes:
@@ -339,6 +359,6 @@ def write_network(folder, model, init):
 
 if __name__ == "__main__":
     chosen = sys.argv[1] if len(sys.argv) > 1 else "IDM"
-    if chosen not in MODELS:
-        sys.exit(f"`{chosen}` is none of {', '.join(MODELS)}")
-    avastra.serve(lambda: Sumo(chosen))
+    if chosen not in (*MODELS, "careful"):
+        sys.exit(f"`{chosen}` is none of {', '.join(MODELS)}, careful")
+    avastra.serve(lambda: Careful() if chosen == "careful" else Sumo(chosen))

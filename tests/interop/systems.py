@@ -1,0 +1,129 @@
+"""What avastra finds of driving systems that others wrote: `systems.py AVASTRA OUT [--episodes N] [--rows N] NAME…`.
+
+Each NAME is an adapter of python/adapters, as `run.sh` takes it. It drives each road alone and in light traffic, meets random actions under the law,
+random manoeuvres, and rows of the catalogue. OUT keeps the runs, and what was measured as JSON: what is there is not measured again, so the last
+call prints the table of all. Installing needs the network.
+"""
+
+import argparse
+import collections
+import json
+import os
+import pathlib
+import resource
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+#: Of each part: the space, and how it is played.
+PARTS = {
+    "law": ("avastra45_law.ava", ["--episodes"]),
+    "manoeuvres": ("manoeuvres.ava", ["--episodes"]),
+    "pre_crash": ("catalogue/pre_crash.ava", ["--agent", "every-row"]),
+    "euro_ncap": ("catalogue/euro_ncap_vulnerable.ava", ["--agent", "every-row", "--shard"]),
+}
+
+
+def cpu_s():
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def called(command, out):
+    """The JSON that a command prints, with its processor time; kept in `out`."""
+    if out.exists():
+        return json.loads(out.read_text())
+    used = cpu_s()
+    done = subprocess.run(command, capture_output=True, text=True)
+    if not done.stdout.startswith("{"):
+        sys.exit(f"{' '.join(command)}\n{done.stderr}")
+    found = {**json.loads(done.stdout), "cpu_s": cpu_s() - used}
+    out.write_text(json.dumps(found))
+    return found
+
+
+def profile(name):
+    """Installs an adapter, if it is not there, and writes its profile."""
+    asked = ["sh", str(ROOT / "python/adapters/run.sh"), name]
+    return subprocess.run(asked, check=True, capture_output=True, text=True).stdout.strip()
+
+
+def measured(name, options):
+    """The JSON of each part for a driving system."""
+    out = options.out / name.replace(":", "_")
+    out.mkdir(parents=True, exist_ok=True)
+    asked = ["--format", "json", "--ads", profile(name)]
+    parts = {"check": called([options.avastra, "ads", "check", "--drive=10", *asked], out / "check.json")}
+    for part, (space, how) in PARTS.items():
+        number = {"--episodes": [str(options.episodes)], "--shard": [f"1/{options.shards}"]}.get(how[-1], [])
+        play = [options.avastra, "run", str(ROOT / "scenarios" / space), *how, *number, "--jobs", str(options.jobs)]
+        parts[part] = called([*play, *asked, "-o", str(out / part)], out / f"{part}.json")
+    scenarios = [str(file) for part in PARTS for file in parts[part]["critical"]]
+    if scenarios:
+        careful = ["--ads", profile(f"{name.partition(':')[0]}:careful"), "--format", "json"]
+        parts["careful"] = called([options.avastra, "test", *scenarios, *careful], out / "careful.json")
+    return parts
+
+
+def failures(parts):
+    """Of each kind: the failures that recur. A kind is a pre-crash type without road, or a requirement; all red lights are one."""
+    found = collections.Counter()
+    for part in PARTS:
+        for group in parts[part]["groups"]:
+            # Wrecks of other crashes and "other" are no kinds.
+            if group["precrash_number"] is not None and group["precrash"] != "other":
+                found[group["precrash"]] += group["recurring"]
+        for episode in parts[part]["found"]:
+            recurrence = episode["recurrence"]
+            if episode["finding"] != "collision" and recurrence and 2 * recurrence["recurred"] > recurrence["replays"]:
+                found[episode["finding"]] += 1
+    return +found
+
+
+def column(parts):
+    """What the table says of a driving system."""
+    alone, among = parts["check"]["drives"]
+    breaches = ", ".join(f"{found['times']} × `{name}`" for name, found in alone["breaches"].items()) or "none"
+    careful = parts.get("careful", {"passed": 0, "changed": 0, "still_fails": 0})
+    recurring = failures(parts)
+    yield "arrived alone, and among six vehicles, of 40", f"{alone['arrived']}, {among['arrived']}"
+    yield "breaches alone", breaches
+    yield "beside the route, median and 99 of 100", "{median:.2f}, {most_of_99:.2f} m".format(**alone["beside_m"])
+    yield "answer, median and 99 of 100", "{:.1f}, {:.0f} ms".format(*(1e3 * parts["law"]["thinking"][key] for key in ("median_s", "most_of_99_s")))
+    for part in PARTS:
+        totals = parts[part]["totals"]
+        yield f"{part}: episodes", totals["episodes"]
+        yield f"{part}: counted, breached", f"{totals['counted']}, {totals['episodes_with_breach']}"
+        yield f"{part}: findings that recur", f"{totals['recurring']} of {totals['replayed']}"
+    yield "recurring failures, kinds", f"{sum(recurring.values())}, {len(recurring)}"
+    yield "the careful planner: passed, fails, other course", f"{careful['passed']}, {careful['still_fails']}, {careful['changed']}"
+    yield "CPU min", round(sum(found["cpu_s"] for found in parts.values()) / 60)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("avastra")
+    parser.add_argument("out", type=pathlib.Path)
+    parser.add_argument("names", nargs="+")
+    parser.add_argument("--episodes", type=int, default=30, help="episodes on each of four roads")
+    parser.add_argument("--shards", type=int, default=6, help="of the 151 rows of Euro NCAP, one in so many")
+    parser.add_argument("--jobs", type=int, default=2)
+    options = parser.parse_args()
+    options.avastra = os.path.abspath(options.avastra)
+    found = {name: measured(name, options) for name in options.names}
+    columns = {name: dict(column(parts)) for name, parts in found.items()}
+    print("|", *(f"| `{name}`" for name in columns), "|")
+    print("|---" * (len(columns) + 1) + "|")
+    for row in next(iter(columns.values())):
+        print("|", row, *(f"| {values[row]}" for values in columns.values()), "|")
+    total, once = collections.Counter(), 0
+    for name, parts in found.items():
+        kinds = failures(parts)
+        total += kinds
+        once += len(kinds)
+        print(f"\n{name}: {sum(kinds.values())} of {len(kinds)} kinds:", "; ".join(f"{count} × {kind}" for kind, count in kinds.most_common()))
+    print(f"\nall: {sum(total.values())} of {len(total)} kinds; {once} if each kind counts once a system")
+
+
+if __name__ == "__main__":
+    main()
