@@ -28,4 +28,5 @@ cut_in 0.5,2.4
 left_turn 6,7.94
 from_the_right 5.5,7.12
 crosswalk 11.5,13.42
+strangers_pedestrian 1.3,3.26 scenarios/strangers/metadrive_crossroad_0069.ava
 END

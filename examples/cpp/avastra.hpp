@@ -565,6 +565,15 @@ struct RoutePoint {
     double x = 0.0, y = 0.0, heading = 0.0, curvature = 0.0, speed_limit = 0.0;
 };
 
+/// A crossing of the route with another lane, at `route_s` and at `s` of that lane.
+struct Conflict {
+    double route_s = 0.0;
+    std::string lane;
+    double s = 0.0;
+    /// Heading of that lane minus that of the route, rad; positive comes from the right.
+    double angle = 0.0;
+};
+
 /// The way to the goal. `path` has a point every `spacing` m, lane changes included. It goes on beyond the goal.
 struct Route {
     std::vector<RouteLane> lanes;
@@ -574,6 +583,8 @@ struct Route {
     std::vector<RouteStopLine> stop_lines;
     std::vector<RouteSign> signs;
     std::vector<Range> crosswalks;
+    /// Where the path crosses other lanes inside junctions; only if `Ready::wants` has `conflicts`.
+    std::optional<std::vector<Conflict>> conflicts;
 };
 
 /// The beginning of an episode.
@@ -584,6 +595,8 @@ struct Reset {
     Start start;
     Goal goal;
     Route route;
+    /// The seed in full, as scenarios have it; only if `Ready::wants` has `names`.
+    std::optional<std::string> episode_seed;
 };
 
 /// The ego vehicle. `vx` and `vy` are in the map frame, `speed` and `accel` along the vehicle.
@@ -936,14 +949,19 @@ inline void fields(Fields& field, Map& into) {
     for (std::size_t index = 0; index < into.lanes.size(); ++index) into.places.emplace(into.lanes[index].id, index);
 }
 
+inline void fields(Fields& field, Conflict& into) {
+    field("route_s", into.route_s), field("lane", into.lane), field("s", into.s), field("angle", into.angle);
+}
+
 inline void fields(Fields& field, Route& into) {
     field("lanes", into.lanes), field("length", into.length), field("spacing", into.spacing), field("path", into.path);
     field("changes", into.changes), field("stop_lines", into.stop_lines), field("signs", into.signs);
-    field("crosswalks", into.crosswalks);
+    field("crosswalks", into.crosswalks), field("conflicts", into.conflicts);
 }
 
 inline void fields(Fields& field, Reset& into) {
     field("seed", into.seed), field("map", into.map), field("start", into.start), field("goal", into.goal), field("route", into.route);
+    field("episode_seed", into.episode_seed);
 }
 
 inline void fields(Fields& field, Step& into) {

@@ -442,9 +442,9 @@ def answer(given: Any, seq: int) -> Dict[str, Any]:
     if kind is None:
         wanted = ", ".join(sorted(cls.__name__ for cls in ANSWER_TYPES))
         raise ProtocolError(f"`step` returned {_shown(given)}; it must return one of {wanted}")
+    if isinstance(given, Trajectory):
+        _check_points(given.points)
     message = {"type": kind, "seq": seq, **_plain(given, kind)}
-    if isinstance(given, Trajectory) and len(given.points) < 2:
-        raise ProtocolError(f"`trajectory.points` has {len(given.points)} points, and needs at least 2")
     if isinstance(given, Pedals):
         for pedal in ("throttle", "brake"):
             if not 0.0 <= message[pedal] <= 1.0:
@@ -453,6 +453,17 @@ def answer(given: Any, seq: int) -> Dict[str, Any]:
     if localized is not None:
         message["internal"]["localized"] = dict(zip(("x", "y", "heading"), localized))
     return message
+
+
+def _check_points(points: Any) -> None:
+    if not isinstance(points, (list, tuple)):
+        raise ProtocolError(f"`trajectory.points` is {_shown(points)}, and must be a list")
+    for index, point in enumerate(points):
+        if not isinstance(point, TrajectoryPoint):
+            raise ProtocolError(f"`trajectory.points[{index}]` is {_shown(point)}, and must be a "
+                                "TrajectoryPoint(t_us, x, y, heading, v)")
+    if len(points) < 2:
+        raise ProtocolError(f"`trajectory.points` has {len(points)} points, and needs at least 2")
 
 
 def _plain(value: Any, where: str) -> Any:

@@ -128,7 +128,7 @@ impl Never {
             lines.extend(indented(4, &format!("{}: {reason} ({times})", named(members.into_iter()))));
         }
         if left > 0 {
-            lines.push(format!("    and {} others", plural(left, "reason")));
+            lines.push(format!("    and {}", plural(left, "other reason")));
         }
         lines.join("\n")
     }

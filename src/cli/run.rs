@@ -41,6 +41,9 @@ const EPISODES: u32 = 100;
 /// Episodes that are played twice with a program that says it is deterministic. One alone may come out the same by chance.
 const SPOT_CHECKS: usize = 3;
 
+/// Episodes that did not arrive that are named at most.
+const SHORT_NAMED: usize = 3;
+
 /// Episodes that a run keeps if it found nothing, so that there is something to look at.
 const KEPT_OF_NOTHING: u32 = 3;
 
@@ -207,7 +210,8 @@ fn play_all(
     let totals = directory.read(Database::totals)?;
     let refusals = directory.read(Database::refusals)?;
     let is_mixed = program.is_some_and(|program| !program.is_deterministic());
-    output.say(&totals_text(&totals, started.elapsed().as_secs_f64(), todo.len(), is_mixed));
+    let short = directory.read(Database::short)?;
+    output.say(&totals_text(&totals, &short, started.elapsed().as_secs_f64(), todo.len(), is_mixed));
     if totals.replayed > 0 && !oracle::can_tell(run.settings().replays) {
         output.say("fewer than 7 replays never show that a finding recurs: `--repeat 20`");
     }
@@ -260,7 +264,7 @@ fn play_all(
     if !kept.is_empty() {
         let kept = plural(kept.len(), "episode");
         output.say(&format!(
-            "{kept} without a finding in {}/kept:\n  first those with a collision that does not count, then the nearest misses",
+            "{kept} without a finding in {}/kept:\n  first those with a collision that does not count, then those that did not\n  arrive, then the nearest misses",
             directory.path.shown()
         ));
     }
@@ -506,7 +510,8 @@ fn heading(run: &Run) -> String {
     )
 }
 
-fn totals_text(totals: &Totals, elapsed_s: f64, played: usize, is_mixed: bool) -> String {
+/// `short`: the names of the episodes that did not arrive.
+fn totals_text(totals: &Totals, short: &[String], elapsed_s: f64, played: usize, is_mixed: bool) -> String {
     let ends = [
         (totals.arrived, "at the goal"),
         (totals.stalled, "stalled"),
@@ -521,6 +526,15 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize, is_mixed: bool) -
     let mut text = format!("\n{} ended", plural(totals.episodes as usize, "episode"));
     if !ends.is_empty() {
         text.push_str(&format!(": {}", ends.join(", ")));
+    }
+    if !short.is_empty() {
+        let named = short.iter().take(SHORT_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+        let others = match short.len().saturating_sub(SHORT_NAMED) {
+            0 => String::new(),
+            1 => " and 1 other".to_owned(),
+            more => format!(" and {more} others"),
+        };
+        text.push_str(&format!("\nnot at the goal: {named}{others}"));
     }
     let (driven_km, simulated_min) = (totals.driven_m / 1000.0, totals.simulated_s / 60.0);
     text.push_str(&format!("\n{driven_km:.1} km in {simulated_min:.1} min of simulated time"));

@@ -130,7 +130,7 @@ run
   tests[] object of `every-row`: an action that was carried out, or that was refused (why is `refused`; without an `ending`): `episode`, `road`, `action`, its `values`, its `ending` (`avoided`, `near`, `mitigated`, `hit`, `others_crashed`, `failed`: the driving system failed), speeds before and at the first contact (m/s) and its `precrash` type, the least `ttc_s`, whether a collision is `counted`, what was `breached`, whether other road users crashed into each other (`others_crashed`)
   tables[] text of `every-row`: the same as CSV and as JUnit XML
   thinking object? of a driving system of your own that was asked: `answers`, seconds by the wall clock (`median_s`, `most_of_99_s`, `most_s`), the share `beyond_period`, how many were `late`
-  kept[] text with `--keep`: paths of episodes without a finding: with a collision that does not count, then the nearest misses
+  kept[] text with `--keep`: paths of episodes without a finding: with a collision that does not count, then those that did not arrive, then the nearest misses
   failures[] object what went wrong with a driving system of your own: `kind`, `problem`, `times`, `detail`, `scenario`
   REPRODUCIBLE
 ads check

@@ -59,11 +59,16 @@ impl FoundIn {
     }
 }
 
+/// How episodes end that do not arrive, though the driving system works.
+const SHORT: &str = "('stalled', 'blocked', 'astray', 'left_the_map', 'limit')";
+
 /// An episode in which nothing was found, and how near it came to that.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Near {
     pub road: String,
     pub episode: i64,
+    /// How the drive ended if it did not arrive: `stalled`, `blocked`, `astray`, `left_the_map` or `limit`.
+    pub short: Option<String>,
     /// The first collision, which does not count, if there was one.
     pub collision: Option<Uncounted>,
     /// The requirement that came nearest to a breach there, with its margin and its unit; `None` if nothing was near.
@@ -92,6 +97,9 @@ impl Near {
                 "A collision with {body}#{obstacle} at {time_s:.2} s does not count. Not met: `{unmet}`."
             );
         }
+        if let Some(ended) = &self.short {
+            return format!("The ego vehicle does not arrive: `{ended}`.");
+        }
         match (&self.requirement, self.ttc_s) {
             (Some((name, margin, unit)), _) => {
                 format!("Nothing is found here: `{name}` is kept by {margin:.2} {unit}.").replace(" .", ".")
@@ -108,15 +116,16 @@ impl Database {
     /// Up to `most` episodes in which nothing was found, in this order:
     ///
     /// 1. those with a collision that does not count;
-    /// 2. of each requirement the one that came nearest to a breach, then of each the second, and so on;
-    /// 3. those with the shortest time to a collision.
+    /// 2. those that did not arrive;
+    /// 3. of each requirement the one that came nearest to a breach, then of each the second, and so on;
+    /// 4. those with the shortest time to a collision.
     ///
     /// # Errors
     /// If the database cannot be read.
     pub fn near(&self, most: usize) -> Result<Vec<Near>, DatabaseError> {
         // The rank is among the episodes of a requirement. An episode may be near a breach of several.
-        let query = "WITH calm AS (
-               SELECT episode, road, (SELECT min(ttc_s) FROM step WHERE step.episode = episode.episode) AS ttc_s
+        let query = format!("WITH calm AS (
+               SELECT episode, road, CASE WHEN ended IN {SHORT} THEN ended END AS short, (SELECT min(ttc_s) FROM step WHERE step.episode = episode.episode) AS ttc_s
                FROM episode
                WHERE counted = 0 AND episode NOT IN (SELECT episode FROM breach)
                  AND episode NOT IN (SELECT episode FROM failure)),
@@ -125,10 +134,10 @@ impl Database {
                SELECT episode, requirement, smallest, coalesce(unit, '') AS unit,
                       row_number() OVER (PARTITION BY requirement ORDER BY smallest, episode) AS rank
                FROM margin WHERE smallest IS NOT NULL AND episode IN (SELECT episode FROM calm))
-             SELECT road, episode, requirement, smallest, unit, ttc_s, body, obstacle, time_s, unmet
+             SELECT road, episode, requirement, smallest, unit, ttc_s, body, obstacle, time_s, unmet, short
              FROM calm LEFT JOIN near USING (episode) LEFT JOIN hit USING (episode)
-             ORDER BY body IS NULL, rank IS NULL, rank, requirement, ttc_s IS NULL, ttc_s, episode";
-        let rows = query_all(&self.connection, query, |row| {
+             ORDER BY body IS NULL, short IS NULL, rank IS NULL, rank, requirement, ttc_s IS NULL, ttc_s, episode");
+        let rows = query_all(&self.connection, &query, |row| {
             let (name, margin): (Option<String>, Option<f64>) = (row.get(2)?, row.get(3)?);
             let unit: Option<String> = row.get(4)?;
             let requirement = name.zip(margin).zip(unit).map(|((name, margin), unit)| (name, margin, unit));
@@ -139,7 +148,8 @@ impl Database {
                 }
                 None => None,
             };
-            Ok(Near { road: row.get(0)?, episode: row.get(1)?, collision, requirement, ttc_s: row.get(5)? })
+            let (road, episode, ttc_s, short) = (row.get(0)?, row.get(1)?, row.get(5)?, row.get(10)?);
+            Ok(Near { road, episode, short, collision, requirement, ttc_s })
         })?;
         let mut found: Vec<Near> = Vec::new();
         for near in rows {
@@ -148,6 +158,18 @@ impl Database {
             }
         }
         Ok(found)
+    }
+
+    /// The names of the episodes that did not arrive, in the order of the episodes.
+    ///
+    /// # Errors
+    /// If the database cannot be read.
+    pub fn short(&self) -> Result<Vec<String>, DatabaseError> {
+        let query = format!("SELECT road, episode FROM episode WHERE ended IN {SHORT} ORDER BY episode");
+        let names = query_all(&self.connection, &query, |row| {
+            Ok(scenario_name(&row.get::<_, String>(0)?, row.get(1)?))
+        })?;
+        Ok(names)
     }
 
     /// Each episode with a collision or a breach: those that count first, then those that recur, then the worst.

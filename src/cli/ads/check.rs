@@ -288,16 +288,17 @@ impl Checks<'_> {
     }
 
     fn fail(&mut self, stage: &'static str, what: &str, failure: Finding) {
-        let mut found = format!("{what}: {}\n  {}", failure.in_words(), failure.problem.advice());
+        let mut found = format!("{what}: {}\n{}", failure.in_words(), failure.problem.advice());
         for line in failure.stderr_lines(STDERR_LINES) {
-            found.push_str(&format!("\n  | {line}"));
+            found.push_str(&format!("\n| {line}"));
         }
         self.note("FAILS", Part { stage, passed: false, found, failure: Some(failure) });
     }
 
-    /// Prints a result under a word: `ok`, `look` or `FAILS`.
+    /// Prints a result under a word: `ok`, `look` or `FAILS`. Further lines stand below the first.
     pub(super) fn note(&mut self, word: &str, part: Part) {
-        self.output.say(&format!("{word:<6}{:<9}{}", part.stage, part.found));
+        let found = part.found.replace('\n', &format!("\n{:15}", ""));
+        self.output.say(&format!("{word:<6}{:<9}{found}", part.stage));
         self.parts.push(part);
     }
 }

@@ -264,9 +264,7 @@ impl Drives {
         let breaches: String = breaches.collect();
         let spread = |of: Option<Spread>, what: &str, unit: &str| {
             of.map_or_else(String::new, |Spread { median, most_of_99 }| {
-                format!(
-                    "\n               {what}: {median:.2} {unit} at the median, {most_of_99:.2} in 99 of 100"
-                )
+                format!("\n{what}: {median:.2} {unit} at the median, {most_of_99:.2} in 99 of 100")
             })
         };
         let figures = [
@@ -276,8 +274,8 @@ impl Drives {
         ];
         let failure = self.failure.as_ref().map_or_else(String::new, |failure| {
             let lines = failure.stderr_lines(STDERR_LINES);
-            let lines = lines.iter().map(|line| format!("\n               | {line}"));
-            format!("\n               {}{}", failure.in_words(), lines.collect::<String>())
+            let lines = lines.iter().map(|line| format!("\n| {line}"));
+            format!("\n{}{}", failure.in_words(), lines.collect::<String>())
         });
         let figures = figures.concat() + &failure;
         format!(
@@ -295,8 +293,10 @@ impl Drives {
             _ => None,
         });
         let breaches = self.breaches.keys().filter_map(|name| match name.as_str() {
-            "stops_at_red" | "stops_at_yellow" => Some("`signals` of `step`, and `stop_lines` of the route"),
-            "stops_at_signs" => Some("`signs` of the route"),
+            "stops_at_red" | "stops_at_yellow" => Some(
+                "`signals` of `step`, and `stop_lines` of the route: `Way.stop` of the clients reads both",
+            ),
+            "stops_at_signs" => Some("`signs` of the route: `Way.stop` of the clients reads them"),
             "keeps_the_limit" => Some("the speed limit in each point of the route's `path`"),
             "drives_by_sight" => Some("`conditions.visibility` of `step`"),
             "keeps_to_its_side" | "stays_on_the_road" | "takes_its_turns" => Some(REFERENCE),
@@ -308,7 +308,7 @@ impl Drives {
         let is_elsewhere = self.is_beside() || self.astray_m.is_some_and(|astray| astray.median > ASTRAY_M);
         let elsewhere = is_elsewhere.then_some(REFERENCE);
         let advice: BTreeSet<&str> = ends.chain(breaches).chain(collisions).chain(elsewhere).collect();
-        advice.iter().map(|text| format!("\n               look at {text}")).collect()
+        advice.iter().map(|text| format!("\nlook at {text}")).collect()
     }
 }
 

@@ -17,6 +17,8 @@ const LATE_MAX: u32 = 3;
 
 /// A trajectory reaches at least this far beyond its step, µs.
 const REACH_US_MIN: u64 = 1_000_000;
+/// The way of a trajectory is at most this long, m: it is sampled each half metre, in each step. Ours.
+const WAY_M_MAX: f64 = 10_000.0;
 
 /// The facts that a driving system states about itself.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -365,6 +367,13 @@ fn judged(answer: Answer, t_us: u64) -> Result<Answer, Broken> {
             );
             return wrong(Problem::OutOfRange, detail);
         }
+        let way_m: f64 =
+            points.windows(2).map(|pair| libm::hypot(pair[1].x - pair[0].x, pair[1].y - pair[0].y)).sum();
+        if way_m > WAY_M_MAX {
+            let detail =
+                format!("the points make a way of {way_m:.0} m; it may be {WAY_M_MAX:.0} m long at most");
+            return wrong(Problem::OutOfRange, detail);
+        }
     }
     Ok(answer)
 }
@@ -413,6 +422,9 @@ mod tests {
         assert_eq!(trajectory(&format!("{},{}", point(1_000_000), point(1_000_000))), Problem::OutOfRange);
         assert_eq!(trajectory(&format!("{},{}", point(1_000_000), point(1_900_000))), Problem::OutOfRange);
         assert_eq!(trajectory(&format!("{},{}", point(1_100_000), point(2_900_000))), Problem::OutOfRange);
+        // Far away is far to sample.
+        let away = r#"{"t_us":2000000,"x":10000000,"y":0,"heading":0,"v":1}"#;
+        assert_eq!(trajectory(&format!("{},{away}", point(900_000))), Problem::OutOfRange);
         let fine = format!(
             r#"{{"type":"trajectory","seq":1,"more":[],"points":[{},{}]}}"#,
             point(900_000),
