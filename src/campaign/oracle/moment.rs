@@ -48,6 +48,8 @@ pub struct Branched {
     pub time_s: f64,
     #[serde(flatten)]
     pub again: Recurrence,
+    /// Branches beside these in which the driving system failed before the finding: they say nothing.
+    pub failed: u32,
 }
 
 impl Branched {
@@ -140,7 +142,7 @@ impl Looked<'_> {
                 again = again.and(self.case.is_again(&log));
             }
         }
-        let branched = Branched { time_s, again };
+        let branched = Branched { time_s, again, failed: number - again.replays };
         self.moments.push(branched);
         branched
     }
@@ -161,7 +163,8 @@ mod tests {
 
     #[test]
     fn the_ends_of_a_rise_lie_on_both_sides_of_it() {
-        let at = |time_s, recurred| Branched { time_s, again: Recurrence { recurred, replays: 20 } };
+        let at =
+            |time_s, recurred| Branched { time_s, again: Recurrence { recurred, replays: 20 }, failed: 0 };
         let moments = vec![at(1.0, 0), at(2.0, 2), at(2.1, 6), at(2.2, 12), at(2.3, 19), at(3.0, 20)];
         let found = NoReturn { found_s: 3.1, moments, rises_s: Some(2.2), avoidable_until_s: None };
         let ends = found.ends().map(|end| end.map(|at| at.time_s));

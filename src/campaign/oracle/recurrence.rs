@@ -149,14 +149,15 @@ impl<'a> Replayed<'a> {
 
     /// How often a finding of the log happened again in the first `replays`. A collision does if the ego vehicle hits the same
     /// obstacle (and is at fault, if it was), a breach if the requirement is breached. An obstacle that never appears, because
-    /// a rule refuses it there, counts as no collision.
+    /// a rule refuses it there, counts as no collision. A replay in which the driving system fails counts only if the finding
+    /// happened before: another one is played for it, with at most twice as many in all.
     pub fn recurrence(&self, found: Found, replays: u32) -> Recurrence {
-        self.until(found, |so_far| so_far.replays == replays)
+        self.until(found, 2 * replays, |so_far| so_far.replays == replays)
     }
 
     /// The same in as many replays as are needed to know whether it recurs, at most `most`.
     pub fn tested(&self, found: Found, most: u32) -> Recurrence {
-        self.until(found, |so_far| so_far.is_settled(most))
+        self.until(found, most, |so_far| so_far.is_settled(most))
     }
 
     /// Whether a finding happens again in at least `needed` of so many replays. The replays stop once that is known.
@@ -164,7 +165,7 @@ impl<'a> Replayed<'a> {
         let is_known = |so_far: Recurrence| {
             so_far.recurred >= needed || so_far.recurred + (replays - so_far.replays) < needed
         };
-        self.until(found, is_known).recurred >= needed
+        self.until(found, replays, is_known).recurred >= needed
     }
 
     /// How many replays were played.
@@ -200,11 +201,17 @@ impl<'a> Replayed<'a> {
         (!is_absent).then(|| fates.iter().any(|(is_again, _)| *is_again))
     }
 
-    fn until(&self, found: Found, is_enough: impl Fn(Recurrence) -> bool) -> Recurrence {
+    fn until(&self, found: Found, most: u32, is_enough: impl Fn(Recurrence) -> bool) -> Recurrence {
         let case = Case::new(self.setup, self.log, found);
         let mut so_far = Recurrence::default();
-        while !is_enough(so_far) {
-            so_far = so_far.and(self.nth(so_far.replays + 1, |play| case.is_again(play)));
+        let mut number = 0;
+        while !is_enough(so_far) && number < most {
+            number += 1;
+            let told = self.nth(number, |play| match case.is_again(play) {
+                false if play.failure.is_some() => None,
+                is_again => Some(is_again),
+            });
+            so_far = told.map_or(so_far, |is_again| so_far.and(is_again));
         }
         so_far
     }

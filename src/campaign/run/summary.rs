@@ -128,11 +128,11 @@ impl EpisodeSummary {
             return;
         }
         let again = Replayed::new(setup, script, log);
+        // If the driving system failed in each, they say nothing.
+        let tested = |found| Some(again.tested(found, most)).filter(|tested| tested.replays > 0);
         let counted = self.collisions.iter().filter(|finding| finding.counted);
-        let collisions: Vec<_> =
-            counted.map(|finding| again.tested(Found::Collision(finding.number), most)).collect();
-        let first =
-            |found: &Breached| Some(again.tested(Found::Breach(log.first_breach(found.requirement)?), most));
+        let collisions: Vec<_> = counted.map(|finding| tested(Found::Collision(finding.number))).collect();
+        let first = |found: &Breached| tested(Found::Breach(log.first_breach(found.requirement)?));
         let breaches: Vec<_> = self.breached.iter().map(first).collect();
         // A driving system that was given up meanwhile drove only some of them.
         if !can_replay(&setup.ads) {
@@ -140,7 +140,7 @@ impl EpisodeSummary {
         }
         let counted = self.collisions.iter_mut().filter(|finding| finding.counted);
         for (finding, recurrence) in counted.zip(collisions) {
-            finding.recurrence = Some(recurrence);
+            finding.recurrence = recurrence;
         }
         for (found, recurrence) in self.breached.iter_mut().zip(breaches) {
             found.recurrence = recurrence;

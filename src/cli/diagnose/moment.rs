@@ -66,12 +66,20 @@ fn moment_text(noun: &str, risen: &NoReturn) -> String {
         (None, _) if moments.iter().all(|at| at.again.replays == 0) => {
             "the driving system failed in every branch".to_owned()
         }
+        (None, _) if moments.iter().any(|at| at.again.replays == 0) => {
+            "nothing can be said: at some moments the driving system failed in every branch".to_owned()
+        }
         (None, _) => format!("up to the last moment many branches had no {noun}: chance made it"),
     };
     let avoidable = avoidable_until_s.map_or(String::new(), |until_s| {
         format!("; a careful driver who takes over avoids it until {until_s:.1} s")
     });
-    format!("{noun} at {found_s:.2} s; {rise}{avoidable}")
+    let failed: u32 = moments.iter().map(|at| at.failed).sum();
+    let failed = match failed {
+        0 => String::new(),
+        _ => format!("; the driving system failed in {failed} other branches, which say nothing"),
+    };
+    format!("{noun} at {found_s:.2} s; {rise}{avoidable}{failed}")
 }
 
 /// A share as a bar of ten signs.

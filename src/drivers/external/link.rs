@@ -39,6 +39,8 @@ const ENDING_S: f64 = 0.5;
 const TERM_S: f64 = 2.0;
 /// So often it is looked whether a silent process still lives, ms.
 const ALIVE_MS: u16 = 100;
+/// A killed process is looked at so often, each millisecond, before it is left.
+const REAP_LOOKS: u32 = 2000;
 
 /// The process groups that were started and not ended.
 static GROUPS: Mutex<BTreeSet<i32>> = Mutex::new(BTreeSet::new());
@@ -402,19 +404,28 @@ impl Link {
         }
     }
 
-    /// Ends the process group at once and reaps the process.
+    /// Ends the process group at once and reaps the process. One that cannot be ended, as another user's, is left after
+    /// some seconds.
     pub fn kill(&mut self) {
         if self.is_ended {
             return;
         }
         self.is_ended = true;
         self.signal(Signal::SIGKILL);
-        if let Ends::Process { child, .. } = &mut self.ends {
+        if let Ends::Process { child, stdin, .. } = &mut self.ends {
+            // It may have left its group; and one that no signal reaches may end with its input.
+            let _ = child.kill();
+            *stdin = None;
             // Forgotten before it is reaped: afterwards its number may belong to another.
             if let Ok(id) = i32::try_from(child.id()) {
                 groups().remove(&id);
             }
-            let _ = child.wait();
+            // Its end takes milliseconds, if a signal reaches it.
+            let mut looks = 0;
+            while matches!(child.try_wait(), Ok(None)) && looks < REAP_LOOKS {
+                std::thread::sleep(Duration::from_millis(1));
+                looks += 1;
+            }
         }
     }
 

@@ -567,7 +567,11 @@ message! {
 
 message! {
     /// A place and a direction.
-    pub struct PoseMessage { x: f64; y: f64; heading: f64; }
+    pub struct PoseMessage {
+        x: f64, -10000000..=10000000;
+        y: f64, -10000000..=10000000;
+        heading: f64, -1000..=1000;
+    }
 }
 
 message! {

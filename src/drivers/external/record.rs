@@ -14,6 +14,7 @@ use avastra_lang::model::{digest, digest_text};
 use super::finding::Failure;
 use super::message::Answer;
 use super::session::Identity;
+use super::session::check_answer;
 use super::settings::ExternalSettings;
 
 /// The format of a file of evidence.
@@ -342,6 +343,9 @@ pub fn from_text(text: &str, digest: Option<&str>) -> Result<Vec<(Key, Outcome)>
         let wrong = |reason: String| RecordError::Line { line: index + 1, reason };
         let written: Written = serde_json::from_str(line).map_err(|error| wrong(error.to_string()))?;
         let key = Key::read(&written.key).ok_or_else(|| wrong(format!("`{}` is no key", written.key)))?;
+        if let Outcome::Answer(answer) = &written.outcome {
+            check_answer(answer).map_err(|broken| wrong(broken.detail))?;
+        }
         Ok((key, written.outcome))
     };
     let exchanges: Vec<(Key, Outcome)> = lines.map(read).collect::<Result<_, _>>()?;
@@ -388,6 +392,20 @@ mod tests {
         assert_eq!(from_text(&text.replace("-0.1", "-0.2"), Some(&digest)), Err(RecordError::Digest));
         assert_eq!(digest_of(&from_text(&text.replace("follow 3", "follow 4"), None).unwrap()), digest);
         assert_eq!(from_text("", None), Err(RecordError::Format));
+        // From somebody else: what no program may answer is not carried out either.
+        for foreign in [
+            r#"{"type":"ready"}"#,
+            r#"{"type":"error","message":"lost"}"#,
+            r#"{"type":"control","seq":0,"steer":0.0}"#,
+            r#"{"type":"acceleration","seq":0,"accel":1e308,"internal":{"localized":{"x":1e308,"y":0,"heading":0}}}"#,
+            r#"{"type":"trajectory","seq":0,"points":[]}"#,
+            r#"{"type":"trajectory","seq":0,"points":[{"t_us":0,"x":0,"y":0,"heading":0,"v":1}]}"#,
+        ] {
+            let own = r#"{"type":"acceleration","seq":0,"accel":-0.1,"internal":{"reason":"follow 3"}}"#;
+            assert!(text.contains(own), "{text}");
+            let told = from_text(&text.replace(own, foreign), None);
+            assert!(matches!(told, Err(RecordError::Line { line: 3, .. })), "{foreign}: {told:?}");
+        }
         let part = |exchanges: &[(Key, Outcome)]| Conversation {
             transcript: Transcript::default(),
             attached: Attached {

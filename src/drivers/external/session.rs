@@ -257,9 +257,9 @@ pub(super) fn read(line: &[u8], wanted: &str) -> Result<Answer, Broken> {
         let text = String::from_utf8_lossy(line);
         let is_number = error.to_string().contains("number out of range")
             || (text.trim_start().starts_with('{')
-                && ["NaN", "Infinity", "nan", "inf"].iter().any(|word| outside_strings(&text, word)));
+                && ["NaN", "Infinity", "nan", "inf"].iter().any(|word| is_value(&text, word)));
         let problem = if is_number { Problem::NotFinite } else { Problem::NotJson };
-        Broken { problem, detail: shown(line) }
+        Broken { problem, detail: format!("{error}: {}", shown(line)) }
     })?;
     let Value::Object(fields) = &value else {
         return Err(Broken { problem: Problem::NotJson, detail: format!("no object: {}", shown(line)) });
@@ -287,14 +287,19 @@ pub(super) fn read(line: &[u8], wanted: &str) -> Result<Answer, Broken> {
     }
 }
 
-/// Whether a word stands in a line of JSON outside its strings.
-fn outside_strings(text: &str, word: &str) -> bool {
+/// Whether a word stands in a line of JSON in place of a number.
+fn is_value(text: &str, word: &str) -> bool {
+    let is_letter = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
     let mut is_string = false;
     let mut previous = ' ';
     for (at, c) in text.char_indices() {
         if c == '"' && previous != '\\' {
             is_string = !is_string;
-        } else if !is_string && text[at..].starts_with(word) {
+        } else if !is_string
+            && text[at..].starts_with(word)
+            && !is_letter(Some(previous))
+            && !is_letter(text[at + word.len()..].chars().next())
+        {
             return true;
         }
         previous = c;
@@ -330,7 +335,7 @@ fn identity(ready: Ready, init: &Init) -> Result<Identity, Broken> {
     let deterministic = ready.deterministic.ok_or_else(|| missing("deterministic"))?;
     let wants = ready.wants.unwrap_or_default();
     if wants.iter().any(|word| *word != in_line(word) || word.chars().count() > 40) {
-        let detail = "the words of `wants` are short, without control characters".to_owned();
+        let detail = "the words of `wants` have at most 40 characters, and no control characters".to_owned();
         return Err(Broken { problem: Problem::WrongShape, detail });
     }
     Ok(Identity { name, version, answer, deterministic, wants })
@@ -338,34 +343,45 @@ fn identity(ready: Ready, init: &Init) -> Result<Identity, Broken> {
 
 /// An answer to a step at `t_us`, if its values are possible.
 fn judged(answer: Answer, t_us: u64) -> Result<Answer, Broken> {
+    check_answer(&answer)?;
+    if let Answer::Trajectory(trajectory) = &answer {
+        let points = &trajectory.points;
+        if points[0].t_us > t_us || points[points.len() - 1].t_us < t_us + REACH_US_MIN {
+            let (first, last) = (points[0].t_us, points[points.len() - 1].t_us);
+            let detail = format!(
+                "the points reach from {first} to {last} µs; the step is at {t_us} µs, and they must reach 1 s beyond it"
+            );
+            return Err(Broken { problem: Problem::OutOfRange, detail });
+        }
+    }
+    Ok(answer)
+}
+
+/// Whether an answer to a step can be carried out, at whatever time: a live one, or one that was recorded.
+pub(super) fn check_answer(answer: &Answer) -> Result<(), Broken> {
     let wrong = |problem, detail: String| Err(Broken { problem, detail });
-    let out_of_range = match &answer {
+    let out_of_range = match answer {
         Answer::Control(control) => control.out_of_range(""),
         Answer::Trajectory(trajectory) => trajectory.out_of_range(""),
         Answer::Acceleration(acceleration) => acceleration.out_of_range(""),
-        Answer::Ready(_) | Answer::Error(_) => None,
+        Answer::Ready(_) | Answer::Error(_) => {
+            return wrong(Problem::WrongType, "no step is answered by this".to_owned());
+        }
     };
     if let Some(broken) = out_of_range {
         return Err(broken);
     }
-    if let Answer::Control(control) = &answer {
+    if let Answer::Control(control) = answer {
         let pedals = (control.accel.is_some(), control.throttle.is_some(), control.brake.is_some());
         if !matches!(pedals, (true, false, false) | (false, true, true)) {
             let detail = "`control` has either `accel`, or `throttle` and `brake`".to_owned();
             return wrong(Problem::WrongShape, detail);
         }
     }
-    if let Answer::Trajectory(trajectory) = &answer {
+    if let Answer::Trajectory(trajectory) = answer {
         let points = &trajectory.points;
         if points.windows(2).any(|pair| pair[1].t_us <= pair[0].t_us) {
             return wrong(Problem::OutOfRange, "`t_us` of the points does not rise".to_owned());
-        }
-        if points[0].t_us > t_us || points[points.len() - 1].t_us < t_us + REACH_US_MIN {
-            let (first, last) = (points[0].t_us, points[points.len() - 1].t_us);
-            let detail = format!(
-                "the points reach from {first} to {last} µs; the step is at {t_us} µs, and they must reach 1 s beyond it"
-            );
-            return wrong(Problem::OutOfRange, detail);
         }
         let way_m: f64 =
             points.windows(2).map(|pair| libm::hypot(pair[1].x - pair[0].x, pair[1].y - pair[0].y)).sum();
@@ -375,7 +391,7 @@ fn judged(answer: Answer, t_us: u64) -> Result<Answer, Broken> {
             return wrong(Problem::OutOfRange, detail);
         }
     }
-    Ok(answer)
+    Ok(())
 }
 
 #[cfg(test)]
