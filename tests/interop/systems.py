@@ -8,9 +8,11 @@ call prints the table of all. Installing needs the network.
 import argparse
 import collections
 import json
+import math
 import os
 import pathlib
 import resource
+import sqlite3
 import subprocess
 import sys
 
@@ -65,27 +67,53 @@ def measured(name, options):
     return parts
 
 
+def recurs(recurred, replays):
+    """Whether the 95 % interval of avastra's sequential test lies above one half."""
+    def beta(a, b):
+        return math.lgamma(a) + math.lgamma(b) - math.lgamma(a + b)
+
+    mixed = beta(recurred + 0.5, replays - recurred + 0.5) - beta(0.5, 0.5)
+    return 2 * recurred > replays and mixed - replays * math.log(0.5) >= math.log(20.0)
+
+
 def failures(parts):
-    """Of each kind: the failures that recur. A kind is a pre-crash type without road, or a requirement; all red lights are one."""
-    found = collections.Counter()
+    """The failures that recur, as (kind, part, road, episode). A kind is a pre-crash type without road, or a requirement.
+
+    A protocol counts every collision; a failure is one that a careful driver avoids and in which the ego vehicle had no priority.
+    """
+    found = []
     for part in PARTS:
-        for group in parts[part]["groups"]:
-            # Wrecks of other crashes and "other" are no kinds.
-            if group["precrash_number"] is not None and group["precrash"] != "other":
-                found[group["precrash"]] += group["recurring"]
-        for episode in parts[part]["found"]:
-            recurrence = episode["recurrence"]
-            if episode["finding"] != "collision" and recurrence and 2 * recurrence["recurred"] > recurrence["replays"]:
-                found[episode["finding"]] += 1
-    return +found
+        run = sqlite3.connect(f"file:{parts[part]['directory']}/run.db?mode=ro", uri=True)
+        # Wrecks of other crashes and "other" are no kinds.
+        collisions = run.execute(
+            "SELECT precrash, road, episode, recurred, replays FROM collision JOIN episode USING (episode) WHERE collision.counted"
+            " AND avoidability = 'avoidable' AND priority <> 'ego' AND NOT struck AND NOT sudden AND NOT repeated"
+            " AND precrash_number IS NOT NULL AND precrash <> 'other' AND replays IS NOT NULL")
+        breaches = run.execute("SELECT requirement, road, episode, min(recurred), min(replays) FROM breach JOIN episode USING (episode)"
+                               " WHERE replays IS NOT NULL AND kept_by <> '' AND NOT EXISTS (SELECT * FROM collision WHERE counted"
+                               " AND collision.episode = breach.episode AND collision.obstacle = breach.obstacle)"
+                               " GROUP BY episode, requirement")
+        for rows in (collisions, breaches):
+            found += [(kind, part, road, episode) for kind, road, episode, *counts in rows if recurs(*counts)]
+    return found
+
+
+def careful(parts, found):
+    """How the scenarios with a failure end with the careful planner."""
+    wanted = {(part, f"{road}_{episode:04}") for _, part, road, episode in found}
+    outcomes = collections.Counter()
+    for scenario in parts.get("careful", {"scenarios": []})["scenarios"]:
+        file = pathlib.Path(scenario["file"])
+        if (file.parent.parent.name, file.stem) in wanted:
+            outcomes[scenario["outcome"]] += 1
+    return f"{outcomes['passed']}, {outcomes['still fails']}, {outcomes['changed']}"
 
 
 def column(parts):
     """What the table says of a driving system."""
     alone, among = parts["check"]["drives"]
-    breaches = ", ".join(f"{found['times']} × `{name}`" for name, found in alone["breaches"].items()) or "none"
-    careful = parts.get("careful", {"passed": 0, "changed": 0, "still_fails": 0})
-    recurring = failures(parts)
+    breaches = ", ".join(f"{breach['times']} × `{name}`" for name, breach in alone["breaches"].items()) or "none"
+    found = failures(parts)
     yield "arrived alone, and among six vehicles, of 40", f"{alone['arrived']}, {among['arrived']}"
     yield "breaches alone", breaches
     yield "beside the route, median and 99 of 100", "{median:.2f}, {most_of_99:.2f} m".format(**alone["beside_m"])
@@ -95,8 +123,8 @@ def column(parts):
         yield f"{part}: episodes", totals["episodes"]
         yield f"{part}: counted, breached", f"{totals['counted']}, {totals['episodes_with_breach']}"
         yield f"{part}: findings that recur", f"{totals['recurring']} of {totals['replayed']}"
-    yield "recurring failures, kinds", f"{sum(recurring.values())}, {len(recurring)}"
-    yield "the careful planner: passed, fails, other course", f"{careful['passed']}, {careful['still_fails']}, {careful['changed']}"
+    yield "recurring failures, kinds", f"{len(found)}, {len({kind for kind, *_ in found})}"
+    yield "the careful planner avoids, fails, other course", careful(parts, found)
     yield "CPU min", round(sum(found["cpu_s"] for found in parts.values()) / 60)
 
 
@@ -118,7 +146,7 @@ def main():
         print("|", row, *(f"| {values[row]}" for values in columns.values()), "|")
     total, once = collections.Counter(), 0
     for name, parts in found.items():
-        kinds = failures(parts)
+        kinds = collections.Counter(kind for kind, *_ in failures(parts))
         total += kinds
         once += len(kinds)
         print(f"\n{name}: {sum(kinds.values())} of {len(kinds)} kinds:", "; ".join(f"{count} × {kind}" for kind, count in kinds.most_common()))

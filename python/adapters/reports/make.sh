@@ -20,6 +20,7 @@ python=$root/target/adapters/$name/bin/python
 cp "$here/$name/README.md" "$here/$name/show.py" "$out"
 case $name in
 fiss) scenario=$here/fiss/red_light.ava ;;
+commonroad_idm) scenario=$root/scenarios/strangers/commonroad_idm_corner_0010.ava ;;
 metadrive) scenario=$root/scenarios/strangers/metadrive_crossroad_0069.ava ;;
 esac
 "$avastra" shrink "$scenario" --ads "$profile" --repeat 0 -o "$out/scenario.ava"
