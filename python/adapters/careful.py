@@ -20,10 +20,10 @@ CHOICES = (2.0, 1.0, 0.0, -1.0, -2.0, -3.0, -4.0, -6.0, -8.0)
 HOLD = 0.4
 #: Braking to a stand is planned with no more than this, m/s²; others may brake as hard as `OTHERS_BRAKE`.
 BRAKING, OTHERS_BRAKE = 4.0, 6.0
-#: Kept free ahead, and on both sides, m; and what the latter gains in a second.
+#: Kept free ahead and behind, and on both sides, m; how fast the latter grows, m/s.
 AHEAD, ASIDE, ASIDE_GAIN = 1.0, 0.4, 0.1
-#: Farther away than this nobody is looked at, m.
-REACH = 120.0
+#: Farther away than this nobody is looked at, m; and how far a way reaches: 25 m/s for the horizon.
+REACH, WAY = 120.0, 125.0
 
 
 @dataclasses.dataclass
@@ -66,7 +66,7 @@ def predicted(times, poses, length, width):
 
 def way(path, station):
     """Rows of station, x, y, heading from a station of an `avastra.Path` on."""
-    ahead = np.arange(0.0, 80.0, 0.5)
+    ahead = np.arange(0.0, WAY, 0.5)
     return np.array([(on, *path.at(station + on)) for on in ahead])
 
 
@@ -75,7 +75,7 @@ def driven(way, speed, accel, dt, seconds):
     times = np.arange(0.0, seconds + dt / 2.0, dt)
     speeds = np.maximum(speed + accel * times, 0.0)
     on = np.append(0.0, np.cumsum((speeds[1:] + speeds[:-1]) / 2.0 * dt))
-    return np.column_stack([*at(way, on), speeds, np.full(len(times), accel)])
+    return np.column_stack([*at(way, on), speeds, np.where(speeds > 0.0, accel, 0.0)])
 
 
 def acceleration(vehicle, way, others, wanted):

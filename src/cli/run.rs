@@ -531,8 +531,7 @@ fn totals_text(totals: &Totals, short: &[String], elapsed_s: f64, played: usize,
         let named = short.iter().take(SHORT_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
         let others = match short.len().saturating_sub(SHORT_NAMED) {
             0 => String::new(),
-            1 => " and 1 other".to_owned(),
-            more => format!(" and {more} others"),
+            more => format!(" and {}", plural(more, "other")),
         };
         text.push_str(&format!("\nnot at the goal: {named}{others}"));
     }

@@ -1,8 +1,8 @@
-"""What avastra finds of driving systems that others wrote: `systems.py AVASTRA OUT [--episodes N] [--rows N] NAME…`.
+"""What avastra finds of driving systems that others wrote: `systems.py AVASTRA OUT [--episodes N] [--shards N] NAME…`.
 
 Each NAME is an adapter of python/adapters, as `run.sh` takes it. It drives each road alone and in light traffic, meets random actions under the law,
-random manoeuvres, and rows of the catalogue. OUT keeps the runs, and what was measured as JSON: what is there is not measured again, so the last
-call prints the table of all. Installing needs the network.
+random manoeuvres, and rows of the catalogue. OUT keeps the runs, and what was measured as JSON. What is there is not measured again, also with
+other options, so a call that names all systems prints the table of all. Installing needs the network.
 """
 
 import argparse
@@ -68,7 +68,7 @@ def measured(name, options):
 
 
 def recurs(recurred, replays):
-    """Whether the 95 % interval of avastra's sequential test lies above one half."""
+    """Whether the 95 % interval of avastra's sequential test lies above one half: `run.db` has the counts, but not the verdict."""
     def beta(a, b):
         return math.lgamma(a) + math.lgamma(b) - math.lgamma(a + b)
 
@@ -79,22 +79,22 @@ def recurs(recurred, replays):
 def failures(parts):
     """The failures that recur, as (kind, part, road, episode). A kind is a pre-crash type without road, or a requirement.
 
-    A protocol counts every collision; a failure is one that a careful driver avoids and in which the ego vehicle had no priority.
+    A protocol counts every collision. A failure is one that a careful driver avoids, that the ego vehicle makes, and in which it had no priority;
+    wrecks of other crashes and "other" are none. A breach is one that a careful driver keeps. It is no second failure if the same road user was hit.
     """
     found = []
     for part in PARTS:
         run = sqlite3.connect(f"file:{parts[part]['directory']}/run.db?mode=ro", uri=True)
-        # Wrecks of other crashes and "other" are no kinds.
         collisions = run.execute(
-            "SELECT precrash, road, episode, recurred, replays FROM collision JOIN episode USING (episode) WHERE collision.counted"
+            "SELECT precrash, road, episode, obstacle, recurred, replays FROM collision JOIN episode USING (episode) WHERE collision.counted"
             " AND avoidability = 'avoidable' AND priority <> 'ego' AND NOT struck AND NOT sudden AND NOT repeated"
             " AND precrash_number IS NOT NULL AND precrash <> 'other' AND replays IS NOT NULL")
-        breaches = run.execute("SELECT requirement, road, episode, min(recurred), min(replays) FROM breach JOIN episode USING (episode)"
-                               " WHERE replays IS NOT NULL AND kept_by <> '' AND NOT EXISTS (SELECT * FROM collision WHERE counted"
-                               " AND collision.episode = breach.episode AND collision.obstacle = breach.obstacle)"
-                               " GROUP BY episode, requirement")
-        for rows in (collisions, breaches):
-            found += [(kind, part, road, episode) for kind, road, episode, *counts in rows if recurs(*counts)]
+        hits = [hit for hit in collisions if recurs(*hit[4:])]
+        breaches = run.execute("SELECT requirement, road, episode, obstacle, min(recurred), min(replays) FROM breach JOIN episode USING (episode)"
+                               " WHERE replays IS NOT NULL AND kept_by <> '' GROUP BY episode, requirement")
+        hit = {(episode, obstacle) for _, _, episode, obstacle, *_ in hits}
+        broken = [breach for breach in breaches if recurs(*breach[4:]) and breach[2:4] not in hit]
+        found += [(kind, part, road, episode) for kind, road, episode, *_ in hits + broken]
     return found
 
 

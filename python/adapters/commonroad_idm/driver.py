@@ -36,7 +36,7 @@ from commonroad_idm_planner.idm_planner import IDMPlanner
 DT = 0.1
 #: How far ahead the path reaches, and what lies between its points, m.
 REACH, SPACING = 60.0, 0.5
-#: Farther ahead than this no road user is told, m: its horizon of 1 s lets none of them meet the path sooner.
+#: Road users farther away than this, m, are left out: none can reach the path within its horizon of 1 s.
 TOLD = 120.0
 #: Slower than this a road user stands, m/s.
 STANDS = 0.1

@@ -169,7 +169,7 @@ def read(car):
 
 def arc(curvature, length):
     """A way that bends up to a length, and goes straight on; rows of station, x, y, heading."""
-    ways = np.arange(0.0, 80.0, 0.5)
+    ways = np.arange(0.0, careful.WAY, 0.5)
     headings = curvature * np.minimum(ways, length)
     x, y = (np.append(0.0, np.cumsum(0.5 * part(headings[:-1]))) for part in (np.cos, np.sin))
     return np.column_stack([ways, x, y, headings])

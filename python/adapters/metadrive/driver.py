@@ -167,7 +167,7 @@ class Careful(Expert):
 
 def bent(navigation, width, aside, turned):
     """The way through two stretches, in the vehicle's frame with y to the left; `aside` is how far its beginning lies to the left."""
-    ways, bends, left = np.arange(0.0, 80.0, 0.5), [], 0.0
+    ways, bends, left = np.arange(0.0, careful.WAY, 0.5), [], 0.0
     for along, across, radius, clockwise, _ in navigation.reshape(2, 5):
         radius *= RADIUS_MAX + width
         reach = left + CHECKPOINT_REACH * math.hypot(2.0 * along - 1.0, 2.0 * across - 1.0) if not bends else math.inf

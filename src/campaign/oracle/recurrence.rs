@@ -66,14 +66,15 @@ impl Recurrence {
         sequential_excludes(self.recurred, self.replays, rate)
     }
 
-    /// Whether further replays, up to `most` in all, hardly give an answer. So few that no answer is possible are all played.
+    /// Whether there is an answer, or further replays, up to `most` in all, hardly give one. So few that no answer is possible are
+    /// all played.
     pub fn is_settled(self, most: u32) -> bool {
         let left = most.saturating_sub(self.replays);
         let is_known = left == 0 || self.recurs() || self.is_rare();
         is_known || can_tell(most) && self.chance_of_an_answer(left) <= HOPELESS
     }
 
-    /// The chance that there is an answer after so many replays more, if every share was as likely before the first one.
+    /// The chance that there is an answer after the last of so many replays more, with a uniform prior on the share.
     fn chance_of_an_answer(self, left: u32) -> f64 {
         let [again, clean] = [self.recurred, self.replays - self.recurred].map(f64::from);
         let (mut weight, mut all, mut answered) = (1.0, 0.0, 0.0);
@@ -155,7 +156,7 @@ impl<'a> Replayed<'a> {
         self.until(found, 2 * replays, |so_far| so_far.replays == replays)
     }
 
-    /// The same in as many replays as are needed to know whether it recurs, at most `most`.
+    /// The same in as many replays as are needed to know whether it recurs. At most `most` are played, failed ones included.
     pub fn tested(&self, found: Found, most: u32) -> Recurrence {
         self.until(found, most, |so_far| so_far.is_settled(most))
     }

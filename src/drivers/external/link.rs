@@ -39,7 +39,7 @@ const ENDING_S: f64 = 0.5;
 const TERM_S: f64 = 2.0;
 /// So often it is looked whether a silent process still lives, ms.
 const ALIVE_MS: u16 = 100;
-/// A killed process is looked at so often, each millisecond, before it is left.
+/// So often, 1 ms apart, it is looked whether a killed process has ended, before it is left.
 const REAP_LOOKS: u32 = 2000;
 
 /// The process groups that were started and not ended.

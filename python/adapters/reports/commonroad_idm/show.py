@@ -1,6 +1,6 @@
 """CommonRoad's IDM planner stops nearer to a pedestrian than to a car, and runs over one who crosses: `pip install commonroad-idm-planner==0.2.1`.
 
-Everything is CommonRoad's: a straight lanelet, the planner with its defaults, its own collision check. Exits with 1 if it collides.
+Everything is CommonRoad's: a straight lanelet, the planner with its defaults, its own collision check. Exits with 3 if it collides.
 """
 
 import logging
@@ -61,4 +61,4 @@ for begin in (-14.0, -12.0, -10.0, -8.0):
     near = [each.velocity for each in states if abs(each.position[0] - 70.0) < LENGTH / 2.0 + 0.25
             and abs(begin + 1.8 * DT * each.time_step) < 1.15]
     print(f"it begins {-begin:.0f} m beside          {has_collided}, {f'{max(near):.1f} m/s' if near else '-'}")
-sys.exit(int(collided))
+sys.exit(3 if collided else 0)

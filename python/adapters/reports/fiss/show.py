@@ -1,6 +1,6 @@
 """FISS drives over an active stop line from rest: `pip install fiss-planner==1.0.0 && python show.py`.
 
-A vehicle stands on a straight lane before a line that is active. It follows each plan of `LocalPlanner.step` exactly. Exits with 1 if it passes the line.
+A vehicle stands on a straight lane before a line that is active. It follows each plan of `LocalPlanner.step` exactly. Exits with 3 if it passes the line.
 """
 
 import sys
@@ -42,7 +42,7 @@ def play(planner, gap, aside):
         if len(plan.t) > 1:
             state = fiss.EgoState(*(float(values[1]) for values in (plan.x, plan.y, plan.yaw, plan.v, plan.a)), 0.0)
         if state.x + half > LINE:
-            return first, f"passes the line at {DT * step:.1f} s with {state.v:.2f} m/s"
+            return first, f"passes the line at {DT * (step + 1):.1f} s with {state.v:.2f} m/s"
     return first, "stays"
 
 
@@ -53,4 +53,4 @@ for planner in ("fiss_plus", "fiss", "fop_plus", "fop"):
         (flags, speed), end = play(planner, 2.5, aside)
         passed |= end != "stays"
         print(f"{planner:10} {2.5:9.1f} m {aside:15.1f} m       {flags}, {speed:.2f} m/s: {end}")
-sys.exit(int(passed))
+sys.exit(3 if passed else 0)
