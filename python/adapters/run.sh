@@ -32,13 +32,14 @@ if ! cmp -s "$here/$name/requirements.txt" "$venv/installed"; then
     python=$(find_python)
     "$python" -m venv "$venv"
     "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$here/$name/requirements.txt"
-    packages=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
-    printf '%s\n' "$root/python" "$here" >"$packages/avastra.pth"
     # What pip cannot install, an adapter fetches itself, into the folder that it is told.
     [ ! -f "$here/$name/install.py" ] || "$venv/bin/python" "$here/$name/install.py" "$venv"
     cp "$here/$name/requirements.txt" "$venv/installed"
 fi
 
+# Each time: what an older installation named may not be all.
+packages=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
+printf '%s\n' "$root/python" "$here" >"$packages/avastra.pth"
 profile=$venv${option:+.$option}.yaml
 cat >"$profile" <<YAML
 ads:

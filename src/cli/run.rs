@@ -42,7 +42,7 @@ const EPISODES: u32 = 100;
 const SPOT_CHECKS: usize = 3;
 
 /// Episodes that did not arrive that are named at most.
-const SHORT_NAMED: usize = 3;
+const NOT_ARRIVED_NAMED: usize = 3;
 
 /// Episodes that a run keeps if it found nothing, so that there is something to look at.
 const KEPT_OF_NOTHING: u32 = 3;
@@ -210,8 +210,8 @@ fn play_all(
     let totals = directory.read(Database::totals)?;
     let refusals = directory.read(Database::refusals)?;
     let is_mixed = program.is_some_and(|program| !program.is_deterministic());
-    let short = directory.read(Database::short)?;
-    output.say(&totals_text(&totals, &short, started.elapsed().as_secs_f64(), todo.len(), is_mixed));
+    let not_arrived = directory.read(Database::not_arrived)?;
+    output.say(&totals_text(&totals, &not_arrived, started.elapsed().as_secs_f64(), todo.len(), is_mixed));
     if totals.replayed > 0 && !oracle::can_tell(run.settings().replays) {
         output.say("fewer than 7 replays never show that a finding recurs: `--repeat 20`");
     }
@@ -510,8 +510,14 @@ fn heading(run: &Run) -> String {
     )
 }
 
-/// `short`: the names of the episodes that did not arrive.
-fn totals_text(totals: &Totals, short: &[String], elapsed_s: f64, played: usize, is_mixed: bool) -> String {
+/// `not_arrived`: the names of the episodes that did not arrive.
+fn totals_text(
+    totals: &Totals,
+    not_arrived: &[String],
+    elapsed_s: f64,
+    played: usize,
+    is_mixed: bool,
+) -> String {
     let ends = [
         (totals.arrived, "at the goal"),
         (totals.stalled, "stalled"),
@@ -527,9 +533,10 @@ fn totals_text(totals: &Totals, short: &[String], elapsed_s: f64, played: usize,
     if !ends.is_empty() {
         text.push_str(&format!(": {}", ends.join(", ")));
     }
-    if !short.is_empty() {
-        let named = short.iter().take(SHORT_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
-        let others = match short.len().saturating_sub(SHORT_NAMED) {
+    if !not_arrived.is_empty() {
+        let named =
+            not_arrived.iter().take(NOT_ARRIVED_NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+        let others = match not_arrived.len().saturating_sub(NOT_ARRIVED_NAMED) {
             0 => String::new(),
             more => format!(" and {}", plural(more, "other")),
         };

@@ -109,11 +109,10 @@ def careful(parts, found):
     return f"{outcomes['passed']}, {outcomes['still fails']}, {outcomes['changed']}"
 
 
-def column(parts):
-    """What the table says of a driving system."""
+def column(parts, found):
+    """What the table says of a driving system with these failures."""
     alone, among = parts["check"]["drives"]
     breaches = ", ".join(f"{breach['times']} × `{name}`" for name, breach in alone["breaches"].items()) or "none"
-    found = failures(parts)
     yield "arrived alone, and among six vehicles, of 40", f"{alone['arrived']}, {among['arrived']}"
     yield "breaches alone", breaches
     yield "beside the route, median and 99 of 100", "{median:.2f}, {most_of_99:.2f} m".format(**alone["beside_m"])
@@ -125,7 +124,7 @@ def column(parts):
         yield f"{part}: findings that recur", f"{totals['recurring']} of {totals['replayed']}"
     yield "recurring failures, kinds", f"{len(found)}, {len({kind for kind, *_ in found})}"
     yield "the careful planner avoids, fails, other course", careful(parts, found)
-    yield "CPU min", round(sum(found["cpu_s"] for found in parts.values()) / 60)
+    yield "CPU min", round(sum(part["cpu_s"] for part in parts.values()) / 60)
 
 
 def main():
@@ -138,15 +137,16 @@ def main():
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
     options.avastra = os.path.abspath(options.avastra)
-    found = {name: measured(name, options) for name in options.names}
-    columns = {name: dict(column(parts)) for name, parts in found.items()}
+    measures = {name: measured(name, options) for name in options.names}
+    found = {name: failures(parts) for name, parts in measures.items()}
+    columns = {name: dict(column(parts, found[name])) for name, parts in measures.items()}
     print("|", *(f"| `{name}`" for name in columns), "|")
     print("|---" * (len(columns) + 1) + "|")
     for row in next(iter(columns.values())):
         print("|", row, *(f"| {values[row]}" for values in columns.values()), "|")
     total, once = collections.Counter(), 0
-    for name, parts in found.items():
-        kinds = collections.Counter(kind for kind, *_ in failures(parts))
+    for name in found:
+        kinds = collections.Counter(kind for kind, *_ in found[name])
         total += kinds
         once += len(kinds)
         print(f"\n{name}: {sum(kinds.values())} of {len(kinds)} kinds:", "; ".join(f"{count} × {kind}" for kind, count in kinds.most_common()))

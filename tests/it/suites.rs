@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use crate::cases::{copy_space, entries, files, name, root};
+use crate::cases::{copy_space, entries, files, files_below, name, root};
 use crate::command::{avastra, done, fails, outcome};
 use crate::world::FLICKER;
 
@@ -65,6 +65,15 @@ fn the_failures_of_strangers_replay() {
         assert!(told.contains("holds, 6 claims confirmed"), "{told}");
         let text = std::fs::read_to_string(&file).expect("it is shipped");
         assert!(text.contains("ads: \"external\"") && text.contains("expect avoidable by"), "{path}");
+        assert!(!text.contains("\\\"/"), "{path} names a place on a machine");
+    }
+    // Of the reports, too, which are played with their packages alone (python/adapters/reports/make.sh).
+    let reports = files_below(root().join("python/adapters/reports"), "ava");
+    assert!(!reports.is_empty());
+    for file in reports {
+        let path = file.display().to_string();
+        done(&["check", &path]);
+        let text = std::fs::read_to_string(&file).expect("it is shipped");
         assert!(!text.contains("\\\"/"), "{path} names a place on a machine");
     }
 }

@@ -38,7 +38,7 @@ impl Space {
         Ok(Space { table: compiled.table, path, said: compiled.diagnostics })
     }
 
-    /// What a row draws on a road: the values of choices, the bounds of numbers, SI.
+    /// The draws of a row on a road: the values of choices, and the bounds of numbers, in SI.
     #[pyo3(signature = (row, road=None))]
     fn draws(&self, row: i64, road: Option<&str>) -> PyResult<Vec<Draw>> {
         let row = &self.table.rows()[known_row(&self.table, row).map_err(PyIndexError::new_err)?];

@@ -41,7 +41,8 @@ fn file(policy: &Policy, space: &Space, space_path: &str, (digest, command): (St
     };
     let docs = policy.docs.iter().map(|text| tree::doc(text)).collect();
     tree::file(
-        [command, "play it with `avastra run --policy FILE`"],
+        command,
+        "play it with `avastra run --policy FILE`",
         space,
         space_path,
         docs,

@@ -95,8 +95,8 @@ fn file(
         steps: (0..steps).map(|number| step(table, log, number)).collect(),
         expects,
     };
-    let head = [source.command, advice];
-    tree::file(head, space, source.space_path, vec![tree::doc(headline)], ItemKind::Scenario(item))
+    let docs = vec![tree::doc(headline)];
+    tree::file(source.command, advice, space, source.space_path, docs, ItemKind::Scenario(item))
 }
 
 /// An action as it was drawn, in one line: `drive_ahead(lane: Left, …) with { speed: 11 m/s, … }`.

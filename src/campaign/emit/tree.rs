@@ -20,7 +20,8 @@ pub fn is_emitted(text: &str) -> bool {
 /// A file with one item, made in a space. The first line names the command that emitted it, and what to do with it; `docs` are the
 /// item's.
 pub fn file(
-    [command, advice]: [&str; 2],
+    command: &str,
+    advice: &str,
     space: &Space,
     space_path: &str,
     docs: Vec<Doc>,

@@ -235,6 +235,12 @@ impl<'a> Case<'a> {
         }
     }
 
+    /// As [`Case::is_again`]; `None` if the driving system failed in the play before, so that it says nothing.
+    pub fn tells(&self, log: &EpisodeLog) -> Option<bool> {
+        let is_again = self.is_again(log);
+        (is_again || log.failure.is_none()).then_some(is_again)
+    }
+
     /// The obstacle's number in another play, if the case is about one that appears there.
     fn obstacle(&self, log: &EpisodeLog) -> Option<u32> {
         match self.what {

@@ -136,11 +136,8 @@ impl Looked<'_> {
         let mut number = 0;
         while number < self.most && !again.is_below(LIKELY) && !again.is_above(LIKELY) {
             number += 1;
-            let log = branch(self.case, time_s, number);
-            // A branch in which the driving system failed says nothing.
-            if log.failure.is_none() || self.case.is_again(&log) {
-                again = again.and(self.case.is_again(&log));
-            }
+            let told = self.case.tells(&branch(self.case, time_s, number));
+            again = told.map_or(again, |is_again| again.and(is_again));
         }
         let branched = Branched { time_s, again, failed: number - again.replays };
         self.moments.push(branched);

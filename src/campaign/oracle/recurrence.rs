@@ -208,10 +208,7 @@ impl<'a> Replayed<'a> {
         let mut number = 0;
         while !is_enough(so_far) && number < most {
             number += 1;
-            let told = self.nth(number, |play| match case.is_again(play) {
-                false if play.failure.is_some() => None,
-                is_again => Some(is_again),
-            });
+            let told = self.nth(number, |play| case.tells(play));
             so_far = told.map_or(so_far, |is_again| so_far.and(is_again));
         }
         so_far

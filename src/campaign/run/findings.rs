@@ -60,7 +60,7 @@ impl FoundIn {
 }
 
 /// How episodes end that do not arrive, though the driving system works.
-const SHORT: &str = "('stalled', 'blocked', 'astray', 'left_the_map', 'limit')";
+const NOT_ARRIVED: &str = "('stalled', 'blocked', 'astray', 'left_the_map', 'limit')";
 
 /// An episode in which nothing was found, and how near it came to that.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -68,7 +68,7 @@ pub struct Near {
     pub road: String,
     pub episode: i64,
     /// How the drive ended if it did not arrive: `stalled`, `blocked`, `astray`, `left_the_map` or `limit`.
-    pub short: Option<String>,
+    pub not_arrived: Option<String>,
     /// The first collision, which does not count, if there was one.
     pub collision: Option<Uncounted>,
     /// The requirement that came nearest to a breach there, with its margin and its unit; `None` if nothing was near.
@@ -97,7 +97,7 @@ impl Near {
                 "A collision with {body}#{obstacle} at {time_s:.2} s does not count. Not met: `{unmet}`."
             );
         }
-        if let Some(ended) = &self.short {
+        if let Some(ended) = &self.not_arrived {
             return format!("The ego vehicle does not arrive: `{ended}`.");
         }
         match (&self.requirement, self.ttc_s) {
@@ -125,7 +125,7 @@ impl Database {
     pub fn near(&self, most: usize) -> Result<Vec<Near>, DatabaseError> {
         // The rank is among the episodes of a requirement. An episode may be near a breach of several.
         let query = format!("WITH calm AS (
-               SELECT episode, road, CASE WHEN ended IN {SHORT} THEN ended END AS short, (SELECT min(ttc_s) FROM step WHERE step.episode = episode.episode) AS ttc_s
+               SELECT episode, road, CASE WHEN ended IN {NOT_ARRIVED} THEN ended END AS not_arrived, (SELECT min(ttc_s) FROM step WHERE step.episode = episode.episode) AS ttc_s
                FROM episode
                WHERE counted = 0 AND episode NOT IN (SELECT episode FROM breach)
                  AND episode NOT IN (SELECT episode FROM failure)),
@@ -134,9 +134,9 @@ impl Database {
                SELECT episode, requirement, smallest, coalesce(unit, '') AS unit,
                       row_number() OVER (PARTITION BY requirement ORDER BY smallest, episode) AS rank
                FROM margin WHERE smallest IS NOT NULL AND episode IN (SELECT episode FROM calm))
-             SELECT road, episode, requirement, smallest, unit, ttc_s, body, obstacle, time_s, unmet, short
+             SELECT road, episode, requirement, smallest, unit, ttc_s, body, obstacle, time_s, unmet, not_arrived
              FROM calm LEFT JOIN near USING (episode) LEFT JOIN hit USING (episode)
-             ORDER BY body IS NULL, short IS NULL, rank IS NULL, rank, requirement, ttc_s IS NULL, ttc_s, episode");
+             ORDER BY body IS NULL, not_arrived IS NULL, rank IS NULL, rank, requirement, ttc_s IS NULL, ttc_s, episode");
         let rows = query_all(&self.connection, &query, |row| {
             let (name, margin): (Option<String>, Option<f64>) = (row.get(2)?, row.get(3)?);
             let unit: Option<String> = row.get(4)?;
@@ -148,8 +148,8 @@ impl Database {
                 }
                 None => None,
             };
-            let (road, episode, ttc_s, short) = (row.get(0)?, row.get(1)?, row.get(5)?, row.get(10)?);
-            Ok(Near { road, episode, short, collision, requirement, ttc_s })
+            let (road, episode, ttc_s, not_arrived) = (row.get(0)?, row.get(1)?, row.get(5)?, row.get(10)?);
+            Ok(Near { road, episode, not_arrived, collision, requirement, ttc_s })
         })?;
         let mut found: Vec<Near> = Vec::new();
         for near in rows {
@@ -164,8 +164,9 @@ impl Database {
     ///
     /// # Errors
     /// If the database cannot be read.
-    pub fn short(&self) -> Result<Vec<String>, DatabaseError> {
-        let query = format!("SELECT road, episode FROM episode WHERE ended IN {SHORT} ORDER BY episode");
+    pub fn not_arrived(&self) -> Result<Vec<String>, DatabaseError> {
+        let query =
+            format!("SELECT road, episode FROM episode WHERE ended IN {NOT_ARRIVED} ORDER BY episode");
         let names = query_all(&self.connection, &query, |row| {
             Ok(scenario_name(&row.get::<_, String>(0)?, row.get(1)?))
         })?;

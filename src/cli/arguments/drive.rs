@@ -80,8 +80,9 @@ pub struct RunArguments {
     /// whether it recurs; 0 for never. It stops once that is certain.
     #[arg(long = "repeat", value_name = "N", default_value_t = REPLAYS, value_parser = clap::value_parser!(u32).range(0..=i64::from(avastra_lang::model::REPLAYS_MAX)))]
     pub replays: u32,
-    /// Keep N episodes in which nothing was found as scenarios in `kept`, too: first those with a collision that does not count,
-    /// then those that did not arrive, then the nearest misses [default: 3 if a run of an embedded driving system found nothing, else 0].
+    /// Keep N episodes in which nothing was found as scenarios in `kept`, too. First come those with a collision that does not
+    /// count, then those that did not arrive, then the nearest misses [default: 3 if a run of an embedded driving system found
+    /// nothing, else 0].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=1000))]
     pub keep: Option<u32>,
     /// Worker threads; the result does not depend on it [default: one for each core].

@@ -79,7 +79,7 @@ struct Wants {
 
 impl Wants {
     fn of(program: &Program) -> Wants {
-        let words = program.identified().map_or(&[][..], |identity| &identity.wants);
+        let words = program.identify().map_or(&[][..], |identity| &identity.wants);
         let wants = |group: &str| words.iter().any(|word| word == group);
         Wants { motion: wants("motion"), conflicts: wants("conflicts"), names: wants("names") }
     }

@@ -215,7 +215,7 @@ impl Program {
     }
 
     /// What the program says of itself. It is started once to find out, if it never was; if it cannot be, the first question says why.
-    pub(super) fn identified(&self) -> Option<&Identity> {
+    pub(super) fn identify(&self) -> Option<&Identity> {
         if self.identity.get().is_none() && self.may_start {
             let _ = self.start();
         }

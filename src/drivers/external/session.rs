@@ -257,7 +257,7 @@ pub(super) fn read(line: &[u8], wanted: &str) -> Result<Answer, Broken> {
         let text = String::from_utf8_lossy(line);
         let is_number = error.to_string().contains("number out of range")
             || (text.trim_start().starts_with('{')
-                && ["NaN", "Infinity", "nan", "inf"].iter().any(|word| is_value(&text, word)));
+                && ["NaN", "Infinity", "nan", "inf"].iter().any(|word| stands_for_a_number(&text, word)));
         let problem = if is_number { Problem::NotFinite } else { Problem::NotJson };
         Broken { problem, detail: format!("{error}: {}", shown(line)) }
     })?;
@@ -288,7 +288,7 @@ pub(super) fn read(line: &[u8], wanted: &str) -> Result<Answer, Broken> {
 }
 
 /// Whether a word stands in a line of JSON in place of a number.
-fn is_value(text: &str, word: &str) -> bool {
+fn stands_for_a_number(text: &str, word: &str) -> bool {
     let is_letter = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
     let mut is_string = false;
     let mut previous = ' ';
