@@ -66,6 +66,7 @@ fn every_misbehaviour_is_a_finding_and_leaves_nothing_behind() {
         ("nan", "ads_protocol", "not_finite", 3, quick),
         ("late", "ads_timeout", "no_answer", 3, quick),
         ("twice", "ads_protocol", "twice", 3, quick),
+        ("early", "ads_protocol", "unasked", 3, quick),
         ("wrong-seq", "ads_protocol", "wrong_seq", 3, quick),
         ("huge-line", "ads_protocol", "too_long", 3, quick),
         ("close-stdout", "ads_crash", "closed", 3, quick),

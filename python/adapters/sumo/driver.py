@@ -16,7 +16,7 @@ foresees:
 - One that stands beside the strip is passed slowly if it is a pedestrian.
 - A pedestrian who walks towards the strip on a crosswalk is an obstacle that stands at the crosswalk's edge, whoever would be there first.
 
-It does not foresee who speeds up, starts, or turns without a light. Once the front is on the place where two ways meet, it drives on.
+It does not foresee who speeds up, starts, or turns without a light. Once the front is beyond the middle of one who comes onto the strip, it drives on.
 Parameters are SUMO's defaults, except the vehicle's own length and brakes, and `sigma` 0: the driver is not meant to dawdle.
 """
 
@@ -154,7 +154,9 @@ class Sumo(avastra.Driver):
             # What reaches beside the vehicle's front is nothing that it could follow.
             if overlaps and beside.station > front and gap < REACH:
                 speed = other.vx * math.cos(beside.heading) + other.vy * math.sin(beside.heading)
-                yield Leader(f"object {other.id}", max(gap, 0.0), max(speed, 0.0), along)
+                # No vehicle of SUMO's lane comes nearer. So one that does stands where it will be once the ego vehicle has braked.
+                comes = max(-speed, 0.0) * step.ego.speed / GENTLE
+                yield Leader(f"object {other.id}", max(gap - comes, 0.0), max(speed, 0.0), along)
 
     def foreseen(self, step, other, front, red, signs):
         """What another road user will be in the way, if anything."""
@@ -176,9 +178,9 @@ class Sumo(avastra.Driver):
             rears = stations - along / 2.0
             gap = rears[first: last + 1].min() - front
             if abs(turned[0]) < PARALLEL and stations[0] < front + FORESEEN and not walks and abs(turned[first]) < PARALLEL:
-                gap = rears[first] - front - step.ego.speed * TIMES[first]
-                if gap > 0.0:
-                    yield Leader(f"object {other.id}", gap, other.speed, other.length)
+                moved = front + step.ego.speed * TIMES[first]
+                if stations[first] > moved:
+                    yield Leader(f"object {other.id}", max(rears[first] - moved, 0.0), other.speed, other.length)
                 continue
             edge = self.crosswalk(stations[0], offsets[0], front) if walks else None
             if edge is not None:
@@ -187,8 +189,8 @@ class Sumo(avastra.Driver):
             zone = stations[first: last + 1] + along[first: last + 1] / 2.0
             comes = arrival(gap, step.ego.speed, self.vehicle.max_accel, self.way.speed(front))
             leaves = arrival(zone.max() - front + self.vehicle.length, step.ego.speed, LEISURELY, self.way.speed(front))
-            if gap > 0.0 and TIMES[last] + BEFORE > comes and TIMES[first] - AFTER < leaves:
-                yield Leader(f"object {other.id}", gap, 0.0, other.length)
+            if stations[first] > front and TIMES[last] + BEFORE > comes and TIMES[first] - AFTER < leaves:
+                yield Leader(f"object {other.id}", max(gap, 0.0), 0.0, other.length)
 
     def passing(self, step, front):
         """The speed with which pedestrians beside the strip may be passed, m/s."""

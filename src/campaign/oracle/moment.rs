@@ -25,6 +25,9 @@ const AROUND_S: f64 = 0.5;
 /// A finding is likely from a moment on if it happens in more than this share of its branches. Above one half, because many chances
 /// stay near that for a long time.
 const LIKELY: f64 = 0.75;
+/// So many times as many branches may tell whether a moment lies before the rise or after it: 20 put the rise of a slowly rising
+/// chance up to 0.5 s away from where 400 put it.
+const CLOSER: u32 = 5;
 /// A chance at most this high counts as low, and one of at least its complement as high.
 const LOW: f64 = 0.1;
 
@@ -75,31 +78,35 @@ impl NoReturn {
     }
 }
 
-/// How the chance of a finding rose in a log that was played from `setup`, in at most `most` branches of a moment.
+/// How the chance of a finding rose in a log that was played from `setup`. A moment has at most `most` branches, and five times
+/// as many if it decides where the rise is.
 pub fn no_return(setup: &Setup, log: &EpisodeLog, found: Found, most: u32) -> NoReturn {
     let case = Case::new(setup, log, found);
     let found_s = case.time_s();
-    let mut looked = Looked { case: &case, most, moments: Vec::new() };
+    let mut looked = Looked { case: &case, moments: Vec::new() };
     let first_s = fine((found_s - LOOK_BACK_S).max(0.0));
     let last_s = fine(found_s - FINE_S).max(first_s);
     let coarse = ((last_s - first_s) / COARSE_S) as u32;
     let coarse: Vec<f64> =
         (0..=coarse).map(|number| fine(first_s + f64::from(number) * COARSE_S)).chain([last_s]).collect();
-    let is_likely: Vec<bool> = coarse.iter().map(|time_s| looked.at(*time_s).is_likely()).collect();
     // The chance may fall and rise again. The last rise leads to the finding.
-    let last_unlikely = is_likely.iter().rposition(|is_likely| !is_likely);
+    let last_unlikely = coarse.iter().rposition(|time_s| !looked.at(*time_s, CLOSER * most).is_likely());
+    for time_s in &coarse {
+        looked.at(*time_s, most);
+    }
     let rise =
         last_unlikely.filter(|last| last + 1 < coarse.len()).map(|last| [coarse[last], coarse[last + 1]]);
     let rises_s = rise.map(|[mut low_s, mut high_s]| {
         while high_s - low_s > 1.5 * FINE_S {
             let middle_s = fine((low_s + high_s) / 2.0);
-            if looked.at(middle_s).is_likely() { high_s = middle_s } else { low_s = middle_s }
+            let is_likely = looked.at(middle_s, CLOSER * most).is_likely();
+            *(if is_likely { &mut high_s } else { &mut low_s }) = middle_s;
         }
         let around = (AROUND_S / FINE_S) as i32;
         for step in -around..=around {
             let time_s = fine(high_s + f64::from(step) * FINE_S);
             if (first_s..=last_s).contains(&time_s) {
-                looked.at(time_s);
+                looked.at(time_s, most);
             }
         }
         high_s
@@ -121,20 +128,20 @@ fn fine(time_s: f64) -> f64 {
 /// The moments of a finding that were looked at so far.
 struct Looked<'a> {
     case: &'a Case<'a>,
-    most: u32,
     moments: Vec<Branched>,
 }
 
 impl Looked<'_> {
-    /// The branches of a moment, played now if they were not yet. They stop when it is certain whether it is likely from there.
-    fn at(&mut self, time_s: f64) -> Branched {
+    /// The branches of a moment, played now if it has none yet. They stop when it is certain whether it is likely from there, and
+    /// after `most`.
+    fn at(&mut self, time_s: f64, most: u32) -> Branched {
         let is_known = |known: &&Branched| (known.time_s - time_s).abs() < FINE_S / 2.0;
         if let Some(known) = self.moments.iter().find(is_known) {
             return *known;
         }
         let mut again = Recurrence::default();
         let mut number = 0;
-        while number < self.most && !again.is_below(LIKELY) && !again.is_above(LIKELY) {
+        while number < most && !again.is_below(LIKELY) && !again.is_above(LIKELY) {
             number += 1;
             let told = self.case.tells(&branch(self.case, time_s, number));
             again = told.map_or(again, |is_again| again.and(is_again));

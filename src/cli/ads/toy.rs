@@ -138,6 +138,7 @@ impl Toy<'_> {
                 right
             }
             Misbehaviour::Twice => right.repeat(2),
+            Misbehaviour::Early => right + &line(&self.drive(step, seq + 1)),
             Misbehaviour::WrongSeq => line(&self.drive(step, seq + 7)),
             Misbehaviour::HugeLine => {
                 let mut huge = "{\"type\":\"".to_owned();

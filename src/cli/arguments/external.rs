@@ -85,6 +85,7 @@ pub enum Misbehaviour {
     Late,
     LateOnce,
     Twice,
+    Early,
     WrongSeq,
     HugeLine,
     CloseStdout,

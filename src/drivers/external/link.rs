@@ -105,9 +105,12 @@ pub struct Link {
     /// Bytes to be written.
     to_write: Vec<u8>,
     written: usize,
-    /// Bytes that were read and not yet taken.
+    /// Room for what is read at once.
+    chunk: Vec<u8>,
+    /// Bytes that were read, the first of which are taken.
     read: Vec<u8>,
-    /// Up to here `read` has no end of a line.
+    taken: usize,
+    /// From the first that is not taken up to here, `read` has no end of a line.
     searched: usize,
     is_closed: bool,
     /// The process has ended, though its output is open.
@@ -162,6 +165,8 @@ impl Link {
             to_write: Vec::new(),
             written: 0,
             read: Vec::new(),
+            chunk: vec![0; CHUNK_BYTES],
+            taken: 0,
             searched: 0,
             is_closed: false,
             is_orphaned: false,
@@ -190,10 +195,8 @@ impl Link {
     /// If it does not come before the deadline, is too long, or cannot come any more.
     pub fn line(&mut self, deadline: Deadline) -> Result<Vec<u8>, Broken> {
         loop {
-            while let Some(line) = self.take_line()? {
-                if !line.iter().all(u8::is_ascii_whitespace) {
-                    return Ok(line);
-                }
+            if let Some(line) = self.whole_line()? {
+                return Ok(line);
             }
             if self.is_closed || self.is_orphaned {
                 return Err(self.ended());
@@ -212,6 +215,15 @@ impl Link {
                 self.is_orphaned = true;
             }
         }
+    }
+
+    /// A line that is there before anything was asked; a last one before the end of the output is no matter here.
+    ///
+    /// # Errors
+    /// If it is too long.
+    pub fn unasked(&mut self) -> Result<Option<Vec<u8>>, Broken> {
+        self.read_all();
+        self.whole_line()
     }
 
     /// Waits for a moment until something can be read or written, and does so. `false` if nothing could.
@@ -264,12 +276,12 @@ impl Link {
 
     /// Reads what is there: of the answers no more than a line and a half, of standard error all.
     fn read_all(&mut self) {
-        let mut chunk = [0; CHUNK_BYTES];
+        let chunk = &mut self.chunk[..];
         if let Ends::Process { stderr, .. } = &mut self.ends
             && let Some(pipe) = stderr
         {
             loop {
-                match pipe.read(&mut chunk) {
+                match pipe.read(chunk) {
                     Ok(0) => {
                         *stderr = None;
                         break;
@@ -292,11 +304,14 @@ impl Link {
                 }
             }
         }
+        self.read.drain(..self.taken);
+        self.searched -= self.taken;
+        self.taken = 0;
         while self.read.len() <= LINE_BYTES_MAX && !self.is_closed {
             let result = match &mut self.ends {
-                Ends::Process { stdout, .. } => stdout.read(&mut chunk),
-                Ends::Tcp(socket) => socket.read(&mut chunk),
-                Ends::Unix(socket) => socket.read(&mut chunk),
+                Ends::Process { stdout, .. } => stdout.read(chunk),
+                Ends::Tcp(socket) => socket.read(chunk),
+                Ends::Unix(socket) => socket.read(chunk),
             };
             match result {
                 Ok(0) => self.is_closed = true,
@@ -313,22 +328,26 @@ impl Link {
         }
     }
 
-    /// The first whole line of what was read.
-    fn take_line(&mut self) -> Result<Option<Vec<u8>>, Broken> {
-        let end = self.read[self.searched..].iter().position(|byte| *byte == b'\n');
-        let length = end.map_or(self.read.len(), |end| self.searched + end);
-        if length > LINE_BYTES_MAX {
-            let detail = "a line of more than 1 MiB".to_owned();
-            return Err(Broken { problem: Problem::TooLong, detail });
+    /// The first whole line of what was read that is not empty, without its end.
+    fn whole_line(&mut self) -> Result<Option<Vec<u8>>, Broken> {
+        loop {
+            let end = self.read[self.searched..].iter().position(|byte| *byte == b'\n');
+            let end = end.map(|end| self.searched + end);
+            if end.unwrap_or(self.read.len()) - self.taken > LINE_BYTES_MAX {
+                let detail = "a line of more than 1 MiB".to_owned();
+                return Err(Broken { problem: Problem::TooLong, detail });
+            }
+            let Some(end) = end else {
+                self.searched = self.read.len();
+                return Ok(None);
+            };
+            let line = &self.read[self.taken..end];
+            let line = (!line.iter().all(u8::is_ascii_whitespace)).then(|| line.to_vec());
+            (self.taken, self.searched) = (end + 1, end + 1);
+            if line.is_some() {
+                return Ok(line);
+            }
         }
-        let Some(end) = end else {
-            self.searched = self.read.len();
-            return Ok(None);
-        };
-        let mut line: Vec<u8> = self.read.drain(..=self.searched + end).collect();
-        self.searched = 0;
-        line.pop();
-        Ok(Some(line))
     }
 
     /// Why nothing more comes.

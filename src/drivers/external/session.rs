@@ -126,9 +126,9 @@ impl Session {
         Patience { limit_s, waits_for_late }: Patience,
     ) -> Result<Option<(Answer, f64)>, Failure> {
         let wanted = self.identity.answer.name();
-        self.link.send(line);
+        let asked = self.send(line);
         let deadline = Deadline::after(limit_s);
-        let mut found = self.answer(wanted, Some(seq), deadline);
+        let mut found = asked.and_then(|()| self.answer(wanted, Some(seq), deadline));
         if waits_for_late && matches!(found, Err(Broken { problem: Problem::NoAnswer, .. })) {
             found = self.late_answer(wanted, seq, limit_s);
         }
@@ -166,8 +166,24 @@ impl Session {
 
     /// Sends a line that is no step and waits for its answer, that of a type.
     fn ask(&mut self, line: &str, wanted: &str, limit_s: f64) -> Result<Answer, Broken> {
-        self.link.send(line);
+        self.send(line)?;
         self.answer(wanted, None, Deadline::after(limit_s))
+    }
+
+    /// Sends a question. Whatever is there before it answers nothing, unless a step was missed.
+    fn send(&mut self, line: &str) -> Result<(), Broken> {
+        if !self.missed
+            && let Some(line) = self.link.unasked()?
+        {
+            return Err(match read(&line, "ready")?.seq() {
+                Some(seq) if Some(seq) == self.answered => twice(seq),
+                _ => {
+                    Broken { problem: Problem::Unasked, detail: format!("it wrote {} unasked", shown(&line)) }
+                }
+            });
+        }
+        self.link.send(line);
+        Ok(())
     }
 
     /// Waits for an answer: that of a type, and to the step `seq` if it is one.
