@@ -104,8 +104,9 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     output.tell(&format!("{}, into {}", heading(&run), directory.path.shown()));
     conditions::ambient_text(&run).iter().for_each(|text| output.tell(text));
     elsewhere.iter().for_each(|text| output.warn(text));
+    let replays = run.settings().replays;
     let found = play_all(output, (run, directory), elsewhere, arguments.jobs)?;
-    failed_on(&found, &arguments.fail_on)
+    failed_on(&found, replays, &arguments.fail_on)
 }
 
 /// Refuses to fail on what a run cannot find.
@@ -126,7 +127,7 @@ fn can_fail_on(fail_on: &[FailOn], space: &Space, replays: u32) -> Result<(), Fa
 }
 
 /// The failure of a run of which the user asked to fail on something that was found.
-fn failed_on(found: &Totals, fail_on: &[FailOn]) -> Result<(), Failure> {
+fn failed_on(found: &Totals, replays: u32, fail_on: &[FailOn]) -> Result<(), Failure> {
     let asks = |what| fail_on.contains(&what);
     let counted = |count: i64, what: &str| plural(count as usize, what);
     let what = match () {
@@ -157,7 +158,16 @@ fn failed_on(found: &Totals, fail_on: &[FailOn]) -> Result<(), Failure> {
     if found.failed > 0 && (!fail_on.is_empty() || found.failed == found.episodes) {
         return Err(Failure::Ads { findings: found.failed as usize });
     }
-    Ok(())
+    // What could not be played again may recur.
+    match unreplayed(found, replays) {
+        unknown @ 1.. if asks(FailOn::Recurring) => Err(Failure::Ads { findings: unknown as usize }),
+        _ => Ok(()),
+    }
+}
+
+/// Findings that were to be played again and could not be.
+fn unreplayed(found: &Totals, replays: u32) -> i64 {
+    if replays == 0 { 0 } else { found.findings - found.replayed }
 }
 
 /// Plays the episodes that a directory still lacks, and says what all of them came to. `elsewhere`: how the policy was trained
@@ -214,6 +224,13 @@ fn play_all(
     output.say(&totals_text(&totals, &not_arrived, started.elapsed().as_secs_f64(), todo.len(), is_mixed));
     if totals.replayed > 0 && !oracle::can_tell(run.settings().replays) {
         output.say("fewer than 7 replays never show that a finding recurs: `--repeat 20`");
+    }
+    if unreplayed(&totals, run.settings().replays) > 0 {
+        output.warn(&format!(
+            "{} of {} could not be played again, because the driving system failed: nothing says whether they recur",
+            totals.findings - totals.replayed,
+            plural(totals.findings as usize, "finding")
+        ));
     }
     if !refusals.is_empty() {
         output.say(&refusals_text(&refusals));

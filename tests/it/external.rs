@@ -161,6 +161,31 @@ fn what_a_program_reports_is_neither_code_nor_a_line() {
     }
 }
 
+/// A program that drives once, and fails whenever its finding is played again.
+#[test]
+fn a_finding_that_cannot_be_played_again_does_not_pass() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let (mark, program) = (scratch.path().join("has_driven"), scratch.path().join("drive.sh"));
+    let ready = r#"answer '{"type":"ready"}' ;;"#;
+    let once = format!(
+        r#"if [ -e {0} ]; then answer '{{"type":"error","message":"again"}}'; else touch {0}; {ready}"#,
+        mark.display()
+    );
+    let once = once.replace(" ;;", "; fi ;;");
+    let text = REPORTING.replace("\"seq\":3,", "\"seq\":-1,").replace(
+        &format!("'{{\"type\":\"map\"'* | '{{\"type\":\"reset\"'*) {ready}"),
+        &format!("'{{\"type\":\"map\"'*) {ready}\n    '{{\"type\":\"reset\"'*) {once}"),
+    );
+    std::fs::write(&program, text).expect("it is writable");
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o700)).expect("it is ours");
+    let program = program.display().to_string();
+    let settings = ["--episodes", "1", "--jobs", "1", "--repeat", "20", "--fail-on", "recurring"];
+    let (status, result, stderr) = run(&program, &scratch.path().join("run"), &settings);
+    let totals = &result["totals"];
+    assert!(totals["findings"].as_i64() > Some(0) && totals["replayed"] == 0, "{result}{stderr}");
+    assert_eq!((status, &totals["failed"]), (5, &0.into()), "{result}{stderr}");
+}
+
 #[test]
 fn what_cannot_be_reached_any_more_is_given_up() {
     let scratch = tempfile::tempdir().expect("a scratch directory");

@@ -369,6 +369,7 @@ impl Database {
         let findings = query_all(&self.connection, findings, |row| {
             Ok(from_columns(row.get(0)?, row.get(1)?).zip(row.get::<_, Option<bool>>(2)?))
         })?;
+        let found = findings.len() as i64;
         let replayed: Vec<(Recurrence, bool)> = findings.into_iter().flatten().collect();
         let recurring: Vec<bool> =
             replayed.iter().filter(|(of, _)| of.recurs()).map(|(_, is_collision)| *is_collision).collect();
@@ -391,12 +392,12 @@ impl Database {
                         (SELECT coalesce(sum(priority = 'other'), 0) FROM collision),
                         coalesce(sum(ended = 'blocked'), 0), (SELECT count(*) FROM failure),
                         coalesce(sum(ended = 'astray'), 0), coalesce(sum(ended = 'left_the_map'), 0),
-                        (SELECT count(DISTINCT episode) FROM breach), ?1, ?2, ?3,
+                        (SELECT count(DISTINCT episode) FROM breach), ?1, ?2, ?3, ?4,
                         coalesce(sum(red_runs > 0 AND counted = 0
                           AND episode NOT IN (SELECT episode FROM breach)), 0),
                         (SELECT count(DISTINCT episode) FROM step WHERE others_crashed)
                  FROM episode",
-            [replayed, recurring, counted_recurring],
+            [found, replayed, recurring, counted_recurring],
             |row| {
                 let totals = of_columns!(
                     row,
@@ -428,6 +429,7 @@ impl Database {
                         astray,
                         left_map,
                         episodes_with_breach,
+                        findings,
                         replayed,
                         recurring,
                         counted_recurring,
@@ -495,8 +497,9 @@ pub struct Totals {
     pub episodes_with_counted: i64,
     /// Episodes in which a requirement was breached.
     pub episodes_with_breach: i64,
-    /// Counted collisions and requirements breached, one for each episode, that were played again under other chance, and
+    /// Counted collisions and requirements breached, one for each episode; those that were played again under other chance; and
     /// those of them that recur, as [`Recurrence::recurs`] says.
+    pub findings: i64,
     pub replayed: i64,
     pub recurring: i64,
     /// Those of them that are counted collisions.
