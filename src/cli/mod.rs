@@ -43,6 +43,7 @@ mod replay;
 mod report;
 mod results;
 mod review;
+mod rewritten;
 mod road;
 mod run;
 mod run_directory;

@@ -3,7 +3,6 @@
 //! is made. Only differing parts of the file are replaced: digests, the engine, the driving system, and claims that do not
 //! hold any more. Claims that an author took out stay out.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use avastra_campaign::emit;
@@ -11,13 +10,12 @@ use avastra_campaign::episode::{EpisodeLog, Outcome, Script};
 use avastra_campaign::oracle::{self, ClaimResult};
 use avastra_campaign::run::{Asked, EpisodeSummary, RunError, Stage, recorded_traffic};
 use avastra_drivers::external;
-use avastra_lang::model::vocabulary::Word;
-use avastra_lang::model::{Avoidability, Claim, Scenario};
-use avastra_lang::syntax::ast::{self, ClauseKind, Doc, Expect, ExprKind, FileId, Span};
+use avastra_lang::model::{Claim, Scenario};
 use avastra_world::action::ActionTable;
 use avastra_world::sim::ENGINE;
 
 use super::error::Failure;
+use super::rewritten::rewritten;
 
 /// Fields of an origin that say which driving system drove.
 const DRIVEN_BY: [&str; 4] = ["ads", "profile", "profile_digest", "answers"];
@@ -262,218 +260,4 @@ fn newly_hit(scenario: &Scenario, summary: &EpisodeSummary) -> Vec<String> {
     let contacts = summary.collisions.iter().map(|found| &found.collision.contact);
     let new = contacts.filter(|contact| !was_hit(contact.obstacle));
     new.map(|contact| format!("npc#{} is hit at {:.2} s", contact.obstacle, contact.time_s)).collect()
-}
-
-/// A scenario's file with these `fields` of its origin taken from another text of it. The other text's claims replace the
-/// refuted ones. Everything else stays: other claims, comments, ends of lines.
-fn rewritten(text: &str, anew: &str, is_refuted: &[bool], fields: &[&str]) -> String {
-    let (old_file, new_file) = (parsed(text), parsed(anew));
-    let (Some((old, old_docs)), Some((new, new_docs))) = (scenario_of(&old_file), scenario_of(&new_file))
-    else {
-        return text.to_owned();
-    };
-    let mut edits: Vec<(Range<usize>, String)> = Vec::new();
-    for name in fields {
-        edits.extend(field_edit(name, (text, old), (anew, new)));
-    }
-    edits.extend(claim_edits((text, &old.expects), (anew, &new.expects), is_refuted));
-    // The sentence above it tells of the crash, unless the author wrote another one.
-    if let ([old], [new]) = (old_docs, new_docs)
-        && is_refuted.contains(&true)
-        && old.text.contains(" is hit at ")
-    {
-        edits.push((range(old.span), anew[range(new.span)].to_owned()));
-    }
-    edits.sort_by_key(|(range, _)| range.start);
-    let line_end = if text.contains("\r\n") { "\r\n" } else { "\n" };
-    let mut result = String::with_capacity(text.len());
-    let mut at = 0;
-    for (range, with) in edits {
-        // Two fields that go, side by side, may both claim the comma between them.
-        result.push_str(&text[at..range.start.max(at)]);
-        result.push_str(&with.replace('\n', line_end));
-        at = range.end.max(at);
-    }
-    result + &text[at..]
-}
-
-/// The subject of a claim: its kind, and the number of the obstacle or the requirement.
-type About<'a> = (&'a str, Option<&'a str>);
-
-/// Replaces claims that do not hold. The new claim is of the same kind and about the same obstacle, or else about an
-/// obstacle for which the file has no claim of that kind. A claim without such a replacement goes.
-fn claim_edits(
-    (text, old): (&str, &[Expect]),
-    (anew, new): (&str, &[Expect]),
-    is_refuted: &[bool],
-) -> Vec<(Range<usize>, String)> {
-    let claimed: Vec<About> = old.iter().map(about).collect();
-    let mut left: Vec<(About, &Expect)> = new.iter().map(|expect| (about(expect), expect)).collect();
-    let refuted = old.iter().zip(&claimed).zip(is_refuted).filter(|(_, is_refuted)| **is_refuted);
-    let edit = |((expect, known), _): ((&Expect, &About), &bool)| {
-        let is_new = |found: &About| found.0 == known.0 && !claimed.contains(found);
-        let same = left.iter().position(|(found, _)| found == known);
-        match same.or_else(|| left.iter().position(|(found, _)| is_new(found))) {
-            Some(at) => (range(expect.span), anew[range(left.remove(at).1.span)].to_owned()),
-            None => (with_separator(text, range(expect.span)), String::new()),
-        }
-    };
-    refuted.map(edit).collect()
-}
-
-fn about(expect: &Expect) -> About<'_> {
-    let kind = match &expect.claim.kind {
-        ExprKind::Name(name) if Avoidability::from_name(name).is_some() => "avoidable",
-        ExprKind::Name(name) => name,
-        ExprKind::Field { .. } => return about_requirement(&expect.claim),
-        ExprKind::Binary { left, .. } => match &left.kind {
-            ExprKind::Name(name) => name,
-            ExprKind::Field { .. } => return about_requirement(left),
-            _ => "",
-        },
-        _ => "",
-    };
-    let with = expect.clauses.iter().find(|clause| clause.kind == ClauseKind::With);
-    let number = with.and_then(|clause| match &clause.value.kind {
-        ExprKind::Numbered { number, .. } => Some(number.as_str()),
-        _ => None,
-    });
-    (kind, number)
-}
-
-/// `NAME.breached`: a claim about one requirement is not about another.
-fn about_requirement(claim: &ast::Expr) -> About<'_> {
-    match &claim.kind {
-        ExprKind::Field { base, field } => match &base.kind {
-            ExprKind::Name(requirement) => (&field.text, Some(requirement)),
-            _ => (&field.text, None),
-        },
-        _ => ("", None),
-    }
-}
-
-/// How one field of an origin becomes what it is now.
-fn field_edit(
-    name: &str,
-    (text, old): (&str, &ast::Scenario),
-    (anew, new): (&str, &ast::Scenario),
-) -> Option<(Range<usize>, String)> {
-    let find = |scenario: &ast::Scenario| {
-        let field = scenario.origin.iter().find(|field| field.name.text == name);
-        field.map(|field| range(field.span))
-    };
-    match (find(old), find(new)) {
-        (Some(old), Some(new)) => {
-            (text[old.clone()] != anew[new.clone()]).then(|| (old, anew[new].to_owned()))
-        }
-        (Some(old), None) => Some((with_separator(text, old), String::new())),
-        (None, Some(new)) => {
-            let end = old.origin.last()?.span.end;
-            Some((end..end, format!("\n    {}", &anew[new])))
-        }
-        (None, None) => None,
-    }
-}
-
-/// A field with what parts it from its neighbours: its line, if that has nothing else, or a comma.
-fn with_separator(text: &str, field: Range<usize>) -> Range<usize> {
-    let before = text[..field.start].trim_end_matches([' ', '\t']);
-    let after = text[field.end..].trim_start_matches([' ', '\t', ',']);
-    let line_before = before.strip_suffix('\n').map(|before| before.strip_suffix('\r').unwrap_or(before));
-    if let Some(before) = line_before
-        && (after.is_empty() || after.starts_with(['\r', '\n']))
-    {
-        return before.len()..text.len() - after.len();
-    }
-    let is_last = !text[field.end..].trim_start().starts_with(',');
-    match before.strip_suffix(',') {
-        Some(before) if is_last => before.len()..field.end,
-        _ => field.start..text.len() - after.len(),
-    }
-}
-
-fn range(span: Span) -> Range<usize> {
-    span.start..span.end
-}
-
-fn parsed(text: &str) -> ast::File {
-    avastra_lang::syntax::parse(FileId::default(), text).0
-}
-
-fn scenario_of(file: &ast::File) -> Option<(&ast::Scenario, &[Doc])> {
-    file.items.iter().find_map(|item| Some((item.kind.as_scenario()?, item.docs.as_slice())))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_field_goes_with_its_line_or_with_its_comma() {
-        let without = |text: &str| {
-            let start = text.find("ads").expect("it is there");
-            let mut text = text.to_owned();
-            text.replace_range(with_separator(&text, start..start + "ads: cc".len()), "");
-            text
-        };
-        assert_eq!(without("origin {\n    ads: cc,\n    seed: 1\n}"), "origin {\n    seed: 1\n}");
-        assert_eq!(without("origin { ads: cc, seed: 1 }"), "origin { seed: 1 }");
-        assert_eq!(without("origin { seed: 1, ads: cc }"), "origin { seed: 1 }");
-        assert_eq!(without("origin { a: 1, ads: cc, seed: 1 }"), "origin { a: 1, seed: 1 }");
-        assert_eq!(without("a: 1,\r\n  ads: cc,\r\n  b: 2"), "a: 1,\r\n  b: 2");
-    }
-
-    const OLD: &str = "\
-language 1
-/// Sedan npc#1 (DriveAhead) is hit at 3.0 s.
-scenario s {
-  road: corner
-  steps { 0: wait() }
-  // who
-  expect collision with npc#1 at 3.00 s
-  // how
-  expect counted with npc#1
-  expect avoidable by [cc] with npc#1 // by hand
-  expect minimal with npc#1
-  expect proc == [0.1]
-}
-";
-    const NEW: &str = "\
-language 1
-/// SUV npc#2 (Stand) is hit at 4.0 s.
-scenario s {
-  road: corner
-  steps { 0: wait() }
-  expect collision with npc#2 at 4.00 s
-  expect counted with npc#2
-  expect unavoidable with npc#2
-  expect priority == ego with npc#2
-  expect proc == [
-    0.2,
-    0.3,
-  ]
-  expect trace == \"sha256:0\"
-}
-";
-
-    #[test]
-    fn claims_about_another_crash_take_the_place_of_those_about_the_one() {
-        let now = rewritten(OLD, NEW, &[true; 5], &PLAYED_IN);
-        let (_, claims) = now.split_once("wait() }\n").unwrap();
-        let wanted = "  // who
-  expect collision with npc#2 at 4.00 s
-  // how
-  expect counted with npc#2
-  expect unavoidable with npc#2 // by hand
-  expect proc == [
-    0.2,
-    0.3,
-  ]
-}
-";
-        assert_eq!(claims, wanted);
-        // A file keeps its ends of lines.
-        let crlf = |text: &str| text.replace('\n', "\r\n");
-        assert_eq!(rewritten(&crlf(OLD), NEW, &[true; 5], &PLAYED_IN), crlf(&now));
-    }
 }

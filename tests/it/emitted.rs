@@ -76,7 +76,7 @@ fn emitted_scenarios_keep_every_claim() {
         let replays = Replays {
             cause: &|_| Ok(Vec::new()),
             breached: &|| None,
-            recurrence: &|_, _| Err(oracle::NoTries),
+            recurrence: &|_, _, _| Err(oracle::NoTries),
             spare_steps: &|_| Ok(Vec::new()),
         };
         for verdict in oracle::verify(run.space(), scenario, &again, &judgements, &replays) {

@@ -10,8 +10,8 @@ use avastra::rng::{Stream, child_seed};
 use avastra::run::Stage;
 use avastra::sim::{DT_S, Start, World};
 
-use crate::cases::texts;
-use crate::command::done;
+use crate::cases::{root, texts};
+use crate::command::{avastra, done, outcome};
 use crate::world::{FLICKER, read};
 
 /// A branch, written down once more: other noise and other reactions from a moment on.
@@ -95,6 +95,52 @@ fn a_branch_is_the_recorded_drive_until_it_begins() {
         seen == 2
     });
     assert_eq!(seen, 2, "such sensors make crashes");
+}
+
+/// A breach that no chance undoes: the ego vehicle drives faster.
+const SLOW: &str = r#"language 1
+use "ROADS"
+require slow when ego.speed >= 2 m/s: ego.speed <= 9 m/s within 1 s
+action nothing() { spawn Sedan ahead 80 m { does: DriveAhead, lane: Current, speed: 12 m/s } }
+scenario slow_road {
+  road: boulevard
+  start { }
+  steps { 0: nothing() 2: wait() }
+  expect slow.breached // always
+}
+"#;
+
+/// What `diagnose --moment --write` writes of a crash and of a breach is checked to the digit, and written again it is the same.
+#[test]
+fn a_rise_is_a_claim_of_the_file() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let inside = |name: &str| scratch.path().join(name).display().to_string();
+    let (town, out, breach) = (inside("town"), inside("run"), inside("slow_road.ava"));
+    let roads = root().join("scenarios/roads.ava").display().to_string();
+    std::fs::write(&breach, SLOW.replace("ROADS", &roads)).expect("it is writable");
+    done(&["new", &town]);
+    let fault = ["--ads", "scenarios/ads/faults/planning_never_yields.yaml", "--repeat", "0"];
+    let space = inside("town/space.ava");
+    done(&[&["run", &space, "--episodes", "8", "--seed", "3", "--out", &out][..], &fault].concat());
+    let crash = inside("run/critical/corner_0007.ava");
+    let texts = || [&crash, &breach].map(|file| std::fs::read_to_string(file).expect("it is there"));
+    let before = texts();
+    done(&["diagnose", "--moment", "--write", &crash, &breach]);
+    let written = texts();
+    done(&["replay", &crash, &breach]);
+    done(&["fmt", "--check", &crash]);
+    done(&["diagnose", "--moment", "--write", &crash, &breach]);
+    assert_eq!(texts(), written);
+    let is_claim = |line: &&str| line.contains("recurrence == ") && line.ends_with(" s");
+    for (before, written) in before.iter().zip(&written) {
+        let others: Vec<&str> = written.lines().filter(|line| !is_claim(line)).collect();
+        assert_eq!(others, before.lines().collect::<Vec<_>>(), "all else stays");
+        assert!(written.lines().filter(is_claim).count() >= 2, "{written}");
+    }
+    assert!(written[1].contains("  expect slow.breached // always\n  expect slow.recurrence == 18 / 18 at "));
+    std::fs::write(&breach, written[1].replace("18 / 18", "17 / 18")).expect("it is writable");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &breach]));
+    assert!(status == 3 && stdout.contains("slow.recurrence 17 of 18 at "), "{stdout}{stderr}");
 }
 
 /// The rise against 400 branches at each tenth of a second around it:

@@ -118,6 +118,7 @@ test("packed columns come back, of any order, sign and size", async () => {
 
 /** Three ticks of an ego vehicle that gains 1 m a tick; another one is there from tick 1 on. */
 function recording() {
+  const rising = [{ at_s: 0, recurred: 1, replays: 4 }, { at_s: 0.02, recurred: 4, replays: 4 }];
   const columns = [[0, 1, 2], [0, 0, 0], [0, 0.2, 0.4], [50, 50, 50], [5, 7], [0, 0], [1, 0], [4, 6], [0, 2]];
   const ego = { places: [0, 1, 2], brake_lights: [[1, true], [2, false]], length_m: 4.7, width_m: 1.9 };
   for (const name of ["speed_mps", "acceleration_mps2", "steer_rad", "throttle_pct", "brake_pct", "proc"]) ego[name] = 3;
@@ -126,7 +127,8 @@ function recording() {
   const header = {
     ego, obstacles: [other], tracks: [], plans: { counts: 6, x_m: 7, y_m: 8 }, steps: [{ at_s: 0 }, { at_s: 0.04 }],
     held: [[0, "limit", "free"], [0.03, "leader", "follows"]], skies: [], signals: { 3: [[0, "red"], [2, "green"]] },
-    collisions: [{ at_s: 0.02, counted: false }, { at_s: 0.04, counted: true }],
+    collisions: [{ at_s: 0.02, counted: false, moments: [] }, { at_s: 0.04, counted: true, moments: rising }],
+    summary: { breaches: [] },
   };
   const quantisation = { tick_s: 0.02, perceived_s: 0.1, thought_s: 0.1 };
   return { recording: new Recording({ header, columns: columns.map((of) => Float64Array.from(of)) }, quantisation), way };
@@ -153,6 +155,11 @@ test("what was said last holds, and steps and lights are those of the moment", (
   assert.deepEqual([of.held(0.01), of.held(0.03), of.sky(0.01)], ["limit", "leader", ""]);
   assert.deepEqual([of.step(0.03), of.step(0.04)], [0, 1]);
   assert.deepEqual([of.signal(3, 0.02), of.signal(3, 0.04), of.signal(9, 0)], ["red", "green", null]);
+});
+
+test("a finding becomes likely at the first moment with more than three quarters", () => {
+  const { recording: of } = recording();
+  assert.deepEqual([of.chances().at_s, of.rise().at_s], [0.04, 0.02]);
 });
 
 test("a careful driver is there once it takes over, until its end", () => {
@@ -322,7 +329,7 @@ test("every row is drawn in its box, the cursor at its time, and a press seeks",
   const { recording: of } = recording();
   Object.assign(of.header, {
     margins: [{ requirement: "gap", unit: "m", parts: [[1, 6]] }],
-    summary: { breaches: [{ requirement: "gap", at_s: 0.02, until_s: 0.04 }] },
+    summary: { breaches: [{ requirement: "gap", at_s: 0.02, until_s: 0.04, moments: [] }] },
     rows: ["walk()"],
     steps: [
       { at_s: 0, outcome: { kind: "done", row: 0, text: "walk(5 m)", made: [1], at_s: 0 } },
@@ -335,7 +342,7 @@ test("every row is drawn in its box, the cursor at its time, and a press seeks",
   const plots = new Plots(element, of, (timeS) => sought.push(timeS), of);
   plots.draw(0.02);
   const texts = still.drawn.filter(([name]) => name === "fillText").map(([, text]) => text);
-  for (const label of ["Speed", "Accel.", "ProC", "gap", "Held by", "Actions", "walk", "refused walk()", "–", "✕", "0 s"])
+  for (const label of ["Speed", "Accel.", "ProC", "gap", "Chance", "Held by", "Actions", "walk", "refused walk()", "–", "✕", "0 s"])
     assert.ok(texts.includes(label), `${label} is in ${texts}`);
   const tops = still.drawn.filter(([name, , x]) => name === "fillText" && x === 2).map(([, , , y]) => y);
   assert.ok(Math.max(...tops) < Number.parseFloat(element.style.height), "all labels are on the canvas");

@@ -10,6 +10,7 @@
 //! Beside that, a careful driver takes over at each moment: until when would one have avoided the collision?
 
 use crate::episode::{EpisodeLog, Script, Setup};
+use avastra_world::sim::DT_S;
 
 use super::avoidable::avoidable_until;
 use super::case::{Case, Found};
@@ -68,6 +69,21 @@ impl Branched {
 }
 
 impl NoReturn {
+    /// The moments that say most, by rising time: the two [`NoReturn::ends`] and those on both sides of the rise; without a rise,
+    /// the first and the last.
+    pub fn telling(&self) -> Vec<&Branched> {
+        if self.rises_s.is_none() {
+            return self.moments.iter().take(1).chain(self.moments.iter().skip(1).last()).collect();
+        }
+        let rise = self.moments.windows(2).find(|pair| Some(pair[1].time_s) == self.rises_s);
+        let rise = rise.map(|pair| [&pair[0], &pair[1]]);
+        let mut told: Vec<&Branched> =
+            self.ends().into_iter().flatten().chain(rise.into_iter().flatten()).collect();
+        told.sort_by(|one, other| one.time_s.total_cmp(&other.time_s));
+        told.dedup();
+        told
+    }
+
     /// The last moment with a low chance before the rise, and the first with a high one after it.
     pub fn ends(&self) -> [Option<&Branched>; 2] {
         let Some(rises_s) = self.rises_s else { return [None, None] };
@@ -139,21 +155,46 @@ impl Looked<'_> {
         if let Some(known) = self.moments.iter().find(is_known) {
             return *known;
         }
-        let mut again = Recurrence::default();
-        let mut number = 0;
-        while number < most && !again.is_below(LIKELY) && !again.is_above(LIKELY) {
-            number += 1;
-            let told = self.case.tells(&branch(self.case, time_s, number));
-            again = told.map_or(again, |is_again| again.and(is_again));
-        }
+        let is_known = |again: Recurrence| again.is_below(LIKELY) || again.is_above(LIKELY);
+        let (again, number) = branches(self.case, time_s, most, is_known);
         let branched = Branched { time_s, again, failed: number - again.replays };
         self.moments.push(branched);
         branched
     }
 }
 
-/// The nth branch from a moment.
+/// How often a finding of a log happens again in so many branches from a moment on. A branch in which the driving system failed
+/// before it does not count: another one is played for it, with at most twice as many in all.
+pub fn recurrence_from(
+    setup: &Setup,
+    log: &EpisodeLog,
+    found: Found,
+    from_s: f64,
+    replays: u32,
+) -> Recurrence {
+    branches(&Case::new(setup, log, found), from_s, 2 * replays, |again| again.replays == replays).0
+}
+
+/// Plays branches from a moment until it is enough, `most` at most; and how many were played.
+fn branches(
+    case: &Case,
+    time_s: f64,
+    most: u32,
+    is_enough: impl Fn(Recurrence) -> bool,
+) -> (Recurrence, u32) {
+    let mut again = Recurrence::default();
+    let mut number = 0;
+    while number < most && !is_enough(again) {
+        number += 1;
+        let told = case.tells(&branch(case, time_s, number));
+        again = told.map_or(again, |is_again| again.and(is_again));
+    }
+    (again, number)
+}
+
+/// The nth branch from a moment, which begins at a tick: so the moments of a file and those that were looked at are the same.
 fn branch(case: &Case, time_s: f64, number: u32) -> EpisodeLog {
+    let time_s = (time_s / DT_S).round() * DT_S;
     let ads = &case.setup.ads;
     let setup = Setup { start: other_reactions(case.setup, number, time_s), ..case.setup.clone() };
     let successor = ads.clone().with_other_noise(number);

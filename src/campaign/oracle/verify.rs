@@ -45,8 +45,8 @@ pub struct Replays<'a> {
     pub cause: &'a dyn Fn(usize) -> Result<Vec<Module>, NoModules>,
     /// The breached requirements, and the drivers that would have kept them; `None` if that is not tried.
     pub breached: &'a dyn Fn() -> Option<Vec<Breached>>,
-    /// How often a finding happens again under other chance, in so many replays.
-    pub recurrence: &'a dyn Fn(Found, u32) -> Result<Recurrence, NoTries>,
+    /// How often a finding happens again in so many replays under other chance: from the start, or from a moment on, s.
+    pub recurrence: &'a dyn Fn(Found, Option<f64>, u32) -> Result<Recurrence, NoTries>,
     /// Steps that could be left out with the same crash; an external driving system must be there to try.
     pub spare_steps: &'a dyn Fn(usize) -> Result<Vec<usize>, NoTries>,
 }
@@ -138,11 +138,13 @@ impl Played<'_> {
                 let claim = format!("priority {}{}", priority.name(), with(*obstacle));
                 judged(claim, self.collision(*obstacle).and_then(judge))
             }
-            Claim::Recurrence { requirement, obstacle, recurred, replays: wanted } => {
+            Claim::Recurrence { requirement, obstacle, from, recurred, replays: wanted } => {
                 let of = requirement.as_ref().map_or_else(String::new, |name| format!("{name}."));
-                let claim = format!("{of}recurrence {recurred} of {wanted}{}", with(*obstacle));
+                let claim =
+                    format!("{of}recurrence {recurred} of {wanted}{}{}", with(*obstacle), at(from.as_ref()));
                 let found = self.finding(requirement.as_deref(), *obstacle);
-                match found.map(|found| (replays.recurrence)(found, *wanted)) {
+                let from_s = from.map(|from| from.si());
+                match found.map(|found| (replays.recurrence)(found, from_s, *wanted)) {
                     Err(none) => judged(claim, Err(none)),
                     Ok(Ok(found)) if found.recurred == *recurred => judged(claim, Ok(())),
                     Ok(Ok(found)) => judged(claim, Err(found.to_string())),

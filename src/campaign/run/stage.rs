@@ -70,7 +70,7 @@ impl<'a> Stage<'a> {
     /// early claims few replays, and had more.
     pub fn most_replays(&self) -> u32 {
         let most = self.scenario.claims.iter().map(|claim| match claim {
-            Claim::Recurrence { recurred, replays, .. } => {
+            Claim::Recurrence { recurred, replays, from: None, .. } => {
                 let known = Recurrence { recurred: *recurred, replays: *replays };
                 if known.is_settled(REPLAYS) { REPLAYS.max(*replays) } else { *replays }
             }
@@ -151,9 +151,10 @@ impl<'a> Stage<'a> {
         // Played once, for all claims that need it.
         let again = Replayed::new(&setup, &script, log);
         let replays = Replays {
-            recurrence: &|found, replays| match can_replay(ads) {
-                true => Ok(again.recurrence(found, replays)),
-                false => Err(NoTries),
+            recurrence: &|found, from_s, replays| match (can_replay(ads), from_s) {
+                (false, _) => Err(NoTries),
+                (true, None) => Ok(again.recurrence(found, replays)),
+                (true, Some(from_s)) => Ok(oracle::recurrence_from(&setup, log, found, from_s, replays)),
             },
             cause: &|index| {
                 Ok(oracle::diagnose(&setup, log, Found::Collision(index), &ModularConfig::default())?.cause)
@@ -184,7 +185,7 @@ impl<'a> Stage<'a> {
         let replays = Replays {
             cause: &|_| Err(NoModules { ads: ads.title() }),
             breached: &|| None,
-            recurrence: &|_, _| Err(NoTries),
+            recurrence: &|_, _, _| Err(NoTries),
             spare_steps: &|_| Err(NoTries),
         };
         let mut results = oracle::verify(self.table.space(), &scenario, log, judgements, &replays);

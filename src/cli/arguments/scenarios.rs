@@ -56,6 +56,9 @@ pub struct DiagnoseArguments {
     /// it, and until when a careful driver could have avoided it. At each moment, branches begin under other noise.
     #[arg(long, conflicts_with_all = ["outside", "baseline"])]
     pub moment: bool,
+    /// Write the moments around the rise into each file, as claims that `avastra replay` checks and `avastra report` draws.
+    #[arg(long, requires = "moment")]
+    pub write: bool,
     #[command(flatten)]
     pub many: FilesArguments,
 }

@@ -1,16 +1,22 @@
 //! `diagnose --moment`: from when on a finding was all but certain.
 
+use std::path::Path;
+
 use avastra_base::outside::Shown;
+use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::oracle;
-use avastra_campaign::oracle::{Branched, NoReturn};
+use avastra_campaign::oracle::{Branched, Found, NoReturn};
 use avastra_campaign::run::Asked;
+use avastra_lang::model::Space;
 
 use super::super::arguments::DiagnoseArguments;
 use super::super::error::Failure;
+use super::super::files::write_again;
 use super::super::findings::needs_program;
 use super::super::look;
 use super::super::output::Output;
 use super::super::parallel::each_file;
+use super::super::rewritten::with_moments;
 use super::{Case, result};
 
 /// With `--moment`, from when on each finding was all but certain.
@@ -22,6 +28,9 @@ pub fn moments(output: &Output, arguments: &DiagnoseArguments, asked: &Asked) ->
             return Err(needs_program(&scenario.name, "branch"));
         }
         let risen = oracle::no_return(&stage.setup(&ads), &log, found, oracle::REPLAYS);
+        if arguments.write {
+            write(file, table.space(), &log, found, &risen)?;
+        }
         Ok((file.clone(), scenario.name.clone(), found.noun(), risen))
     })?;
     for (file, _, noun, risen) in &found.done {
@@ -42,6 +51,41 @@ pub fn moments(output: &Output, arguments: &DiagnoseArguments, asked: &Asked) ->
     });
     output.result(result(None, scenarios.collect(), found.failed_in_json()));
     found.complete("explained")
+}
+
+/// Writes the moments that say most into the scenario's file, in place of those that it has.
+fn write(
+    file: &Path,
+    space: &Space,
+    log: &EpisodeLog,
+    found: Found,
+    risen: &NoReturn,
+) -> Result<(), Failure> {
+    let (of, with, whom) = match found {
+        Found::Collision(index) => {
+            let number = log.collisions[index].contact.obstacle;
+            (String::new(), format!(" with npc#{number}"), number.to_string())
+        }
+        Found::Breach(index) => {
+            let name = space.requirements[log.breaches[index].requirement].name.clone();
+            (format!("{name}."), String::new(), name)
+        }
+    };
+    // A claim is checked in at most twice as many branches as it counts.
+    let told = risen.telling().into_iter().filter(|at| at.again.replays > 0 && at.failed <= at.again.replays);
+    let claim = |Branched { time_s, again, .. }: &Branched| {
+        format!("{of}recurrence == {} / {}{with} at {time_s:.1} s", again.recurred, again.replays)
+    };
+    let claims: Vec<String> = told.map(claim).collect();
+    let text = std::fs::read_to_string(file).map_err(Failure::usage)?;
+    let text = with_moments(&text, &whom, &claims).ok_or_else(|| {
+        Failure::usage(format!(
+            "{} claims nothing of the {}: nothing was written",
+            file.shown(),
+            found.noun()
+        ))
+    })?;
+    write_again(file, &text)
 }
 
 /// When a finding became certain, in words.

@@ -201,12 +201,13 @@ fn fact(claim: &Claim) -> Option<(String, String)> {
         }
         Claim::Cause { modules, obstacle } => (of("cause", obstacle), modules.join(", ")),
         Claim::Priority { priority, obstacle } => (of("priority", obstacle), priority.name().to_owned()),
-        Claim::Recurrence { requirement, obstacle, recurred, replays } => {
+        Claim::Recurrence { requirement, obstacle, from, recurred, replays } => {
             let what = requirement.as_ref().map_or_else(
                 || of("recurrence", obstacle),
                 |requirement| format!("recurrence of the breach of {requirement}"),
             );
-            (what, format!("{recurred} of {replays}"))
+            let from = from.map_or_else(String::new, |from| format!(" from {from} on"));
+            (format!("{what}{from}"), format!("{recurred} of {replays}"))
         }
         Claim::Minimal { obstacle } => (of("minimal", obstacle), "true".to_owned()),
         Claim::End(end) => ("end".to_owned(), end.clone()),

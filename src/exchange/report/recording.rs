@@ -20,7 +20,7 @@ use avastra_campaign::run;
 use avastra_campaign::run::{Gauges, RunError, Stage, refusal_in_words};
 use avastra_drivers::Selected;
 use avastra_lang::model::vocabulary::{ShownLights, Word};
-use avastra_lang::model::{Claim, Obstacle, RequirementDef, Scenario};
+use avastra_lang::model::{Claim, Figure, Obstacle, RequirementDef, Scenario};
 use avastra_world::action::{ActionTable, Offer};
 use avastra_world::sim::{DT_S, FRAME_TICKS, SignalColour};
 
@@ -285,9 +285,9 @@ fn collision(
         }
         _ => None,
     });
-    let recurrence = recurrence((scenario, log), |requirement, obstacle| {
+    let is_meant = |requirement: Option<&str>, obstacle: Option<Obstacle>| {
         requirement.is_none() && obstacle.is_none_or(|named| named.number == contact.obstacle)
-    });
+    };
     json!({
         "at_s": contact.time_s, "obstacle": contact.obstacle, "body": table.space().body_name(found.body),
         "kind": run::kind(found.body.like.name()), "shape": found.shape.name(), "precrash": found.kind.name(),
@@ -297,7 +297,7 @@ fn collision(
         "evasion": judgement.evasion, "priority": contact.ruling.priority.name(), "ruling": contact.ruling.describe(), "side": severity.side, "approach": severity.approach,
         "ego_mps": contact.ego_speed_mps, "closing_mps": severity.closing_speed_mps, "delta_v_mps": severity.delta_v_mps,
         "other_delta_v_mps": severity.obstacle_delta_v_mps, "harm": severity.harm.name(), "harm_share": rounded(severity.harm_share),
-        "recurrence": recurrence, "sudden": facts.sudden, "struck": facts.struck, "cause": cause,
+        "recurrence": recurrence((scenario, log), is_meant), "moments": moments(scenario, is_meant), "sudden": facts.sudden, "struck": facts.struck, "cause": cause,
         "held": log.held_at(contact.time_s).map(Held::text), "ways": ways,
     })
 }
@@ -328,6 +328,7 @@ fn breaches(table: &ActionTable, scenario: &Scenario, log: &EpisodeLog) -> Vec<V
             "requirement": name, "obstacle": breach.obstacle, "docs": docs.join(" "), "formula": formula, "at_s": breach.time_s, "until_s": breach.until_s,
             "margin": breach.margin.map(rounded), "unit": unit, "kept_by": kept_by,
             "recurrence": recurrence((scenario, log), |requirement, _| requirement == Some(name)),
+            "moments": moments(scenario, |requirement, _| requirement == Some(name)),
         })
     };
     log.breaches.iter().map(told).collect()
@@ -363,17 +364,34 @@ fn recurrence(
     (scenario, log): (&Scenario, &EpisodeLog),
     is_meant: impl Fn(Option<&str>, Option<Obstacle>) -> bool,
 ) -> Option<Value> {
-    scenario.claims.iter().find_map(|claim| match claim {
-        Claim::Recurrence { requirement, obstacle, recurred, replays }
+    let (_, found) = recurrences(scenario, is_meant).find(|(from, _)| from.is_none())?;
+    let program = log.conversation.as_deref().map(|conversation| &conversation.attached);
+    let mixed = program.filter(|attached| !attached.is_deterministic()).map(|_| oracle::MIXED);
+    Some(json!({
+        "recurred": found.recurred, "replays": found.replays, "text": found.to_string(), "recurs": found.recurs(),
+        "word": found.word(mixed.is_some()), "mixed": mixed,
+    }))
+}
+
+/// How often it recurs from moments of the episode on, as the file claims.
+fn moments(scenario: &Scenario, is_meant: impl Fn(Option<&str>, Option<Obstacle>) -> bool) -> Vec<Value> {
+    let told = |(from, found): (Option<Figure>, Recurrence)| {
+        let Recurrence { recurred, replays } = found;
+        Some(json!({ "at_s": from?.si(), "recurred": recurred, "replays": replays }))
+    };
+    recurrences(scenario, is_meant).filter_map(told).collect()
+}
+
+/// All that the file claims of the recurrence of the finding that is meant: from the start, or from a moment on.
+fn recurrences<'a>(
+    scenario: &'a Scenario,
+    is_meant: impl Fn(Option<&str>, Option<Obstacle>) -> bool + 'a,
+) -> impl Iterator<Item = (Option<Figure>, Recurrence)> + 'a {
+    scenario.claims.iter().filter_map(move |claim| match claim {
+        Claim::Recurrence { requirement, obstacle, from, recurred, replays }
             if is_meant(requirement.as_deref(), *obstacle) =>
         {
-            let found = Recurrence { recurred: *recurred, replays: *replays };
-            let program = log.conversation.as_deref().map(|conversation| &conversation.attached);
-            let mixed = program.filter(|attached| !attached.is_deterministic()).map(|_| oracle::MIXED);
-            Some(json!({
-                "recurred": recurred, "replays": replays, "text": found.to_string(), "recurs": found.recurs(),
-                "word": found.word(mixed.is_some()), "mixed": mixed,
-            }))
+            Some((*from, Recurrence { recurred: *recurred, replays: *replays }))
         }
         _ => None,
     })

@@ -51,15 +51,16 @@ impl Reader<'_> {
                     }
                     (ast::ExprKind::Name(name), _) if name == ScenarioClaim::Recurrence.name() => {
                         let (recurred, replays) = self.share(right)?;
-                        let (obstacle, _) = self.clauses(&expect.clauses, false)?;
-                        Some(Claim::Recurrence { requirement: None, obstacle, recurred, replays })
+                        let (obstacle, from) = self.clauses(&expect.clauses, true)?;
+                        Some(Claim::Recurrence { requirement: None, obstacle, from, recurred, replays })
                     }
                     (ast::ExprKind::Field { base, field }, _) if field.text == RECURRENCE.0 => {
                         let requirement = Some(self.requirement(base)?);
                         let (recurred, replays) = self.share(right)?;
-                        match self.clauses(&expect.clauses, false)? {
-                            (None, _) => {
-                                Some(Claim::Recurrence { requirement, obstacle: None, recurred, replays })
+                        match self.clauses(&expect.clauses, true)? {
+                            (None, from) => {
+                                let obstacle = None;
+                                Some(Claim::Recurrence { requirement, obstacle, from, recurred, replays })
                             }
                             (Some(_), _) => {
                                 let example = format!("{}.{} == 14 / 20", name_in(base), RECURRENCE.0);

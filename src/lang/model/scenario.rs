@@ -144,8 +144,15 @@ pub enum Claim {
     /// `expect priority == other with npc#2`: who had priority in the collision.
     Priority { priority: Priority, obstacle: Option<Obstacle> },
     /// `expect recurrence == 14 / 20 with npc#2`, `expect stops_at_red.recurrence == 14 / 20`: in how many replays under
-    /// other chance the collision, or the breach of a requirement, happens again.
-    Recurrence { requirement: Option<String>, obstacle: Option<Obstacle>, recurred: u32, replays: u32 },
+    /// other chance the collision, or the breach of a requirement, happens again. `expect recurrence == 1 / 10 with npc#2 at 3.8 s`:
+    /// the chance is another one from that moment on.
+    Recurrence {
+        requirement: Option<String>,
+        obstacle: Option<Obstacle>,
+        from: Option<Figure>,
+        recurred: u32,
+        replays: u32,
+    },
     /// `expect minimal with npc#2`: if any one step is left out, with its time or without, there is no such
     /// collision.
     Minimal { obstacle: Option<Obstacle> },

@@ -99,6 +99,7 @@ export interface Finding {
   harm: string;
   harm_share: number;
   recurrence: Recurrence | null;
+  moments: Branched[];
   sudden: boolean;
   struck: boolean;
   cause: string[] | null;
@@ -120,6 +121,13 @@ export interface Way {
   speed_mps: Column;
 }
 
+/** In how many branches from a moment on the finding happened again. */
+export interface Branched {
+  at_s: number;
+  recurred: number;
+  replays: number;
+}
+
 export interface Breach {
   requirement: string;
   obstacle: number | null;
@@ -131,6 +139,7 @@ export interface Breach {
   unit: string | null;
   kept_by: string[] | null;
   recurrence: Recurrence | null;
+  moments: Branched[];
 }
 
 export interface Step {

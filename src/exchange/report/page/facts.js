@@ -53,6 +53,7 @@ function broken(breach, seek) {
     ...(breach.docs ? [["In words", breach.docs]] : []),
     ["Broken", `from ${atTime(breach.at_s)} to ${atTime(breach.until_s)}`],
     ...again(breach),
+    ...rise(breach),
   ];
   if (breach.kept_by) {
     const keepers = breach.kept_by.map(driverInWords).join(", ");
@@ -78,6 +79,13 @@ function again({ recurrence }) {
   return [["Under other noise", `recurs in ${text}${mixed ? `; ${mixed}` : ""}`]];
 }
 
+/** How the chance of a finding rose before it, if that was asked. */
+function rise({ moments }) {
+  if (moments.length === 0) return [];
+  const told = moments.map(({ at_s: atS, recurred, replays }) => `from ${atTime(atS)} in ${recurred} of ${replays}`);
+  return [["Under other noise from a moment on", `again ${told.join(", ")}`]];
+}
+
 function verdict(recording, collision, seek, watchDrivers) {
   const { summary } = recording.header;
   const says = collision.counted ? "Counts" : `Does not count (not met: ${collision.unmet.join(", ")})`;
@@ -97,6 +105,7 @@ function verdict(recording, collision, seek, watchDrivers) {
   const rows = [
     ["Verdict", `${says}: ${VERDICTS[collision.class]}`],
     ...again(collision),
+    ...rise(collision),
     ["Priority", collision.ruling],
     ["Harm", `${collision.harm}: ${HARMS[collision.harm]}`],
     ["Cause", causeInWords(collision.cause)],

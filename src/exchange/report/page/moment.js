@@ -1,7 +1,7 @@
 // A scenario as it was at any time: places between ticks, road users, what was believed and planned.
 import { index, unpacked } from "./decode.js";
 
-/** @import { Changes, Column, Ego, Header, Obstacle, Places, Quantisation, Way } from "./data" */
+/** @import { Branched, Changes, Column, Ego, Header, Obstacle, Places, Quantisation, Way } from "./data" */
 
 /** @type {Map<string, Promise<Recording>>} */
 const recordings = new Map();
@@ -284,6 +284,23 @@ export class Recording {
     if (first) return { at_s: first.atS, what: "a manoeuvre begins", obstacle: first.id };
     const done = this.header.steps.find(({ outcome }) => outcome.kind === "done");
     return done ? { at_s: done.at_s, what: "first action", obstacle: null } : null;
+  }
+
+  /**
+   * What the file claims of the chance of its finding, from moments on.
+   * @returns {{ at_s: number, moments: Branched[] } | null}
+   */
+  chances() {
+    const findings = [...this.header.collisions, ...this.header.summary.breaches];
+    return findings.find(({ moments }) => moments.length > 0) ?? null;
+  }
+
+  /**
+   * The first moment from which on its finding was likely: in more than three quarters of the branches.
+   * @returns {Branched | null}
+   */
+  rise() {
+    return this.chances()?.moments.find(({ recurred, replays }) => recurred > 0.75 * replays) ?? null;
   }
 
   /**

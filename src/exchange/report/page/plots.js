@@ -3,7 +3,7 @@ import { TimeAxis } from "./axis.js";
 import { Canvas, contextOf, palette } from "./paint.js";
 import { figure } from "./words.js";
 
-/** @import { Breach, Margin } from "./data" */
+/** @import { Branched, Breach, Margin } from "./data" */
 /** @import { Recording } from "./moment.js" */
 
 /**
@@ -29,6 +29,7 @@ const BOTTOM = 18;
  * @returns {PlotRow[]}
  */
 function plotRows(recording) {
+  const chances = recording.chances();
   return [
     curveRow("Speed", 62, "speed_mps", "km/h", 3.6),
     curveRow("Accel.", 52, "acceleration_mps2", "m/s²", 1),
@@ -38,6 +39,7 @@ function plotRows(recording) {
       height: 44,
       draw: (/** @type {Box} */ box) => drawMargin(box, margin),
     })),
+    ...(chances ? [{ label: "Chance", height: 44, draw: (/** @type {Box} */ box) => drawChance(box, chances) }] : []),
     { label: "Held by", height: 30, draw: drawReasons },
     { label: "Actions", height: 34, draw: drawActions },
   ];
@@ -240,6 +242,33 @@ function drawMargin(box, { requirement, unit, parts }) {
     context.stroke();
   }
   drawScale(box, [low, high], unit ?? "", 1);
+}
+
+/**
+ * In which share of the branches from a moment on a finding happened again, up to the finding itself.
+ * @param {Box} box
+ * @param {{ at_s: number, moments: Branched[] }} chances
+ */
+function drawChance(box, { at_s: foundS, moments }) {
+  const { canvas, axis, top, height } = box;
+  const { context, colours } = canvas;
+  const shares = moments.map(({ at_s: atS, recurred, replays }) => [atS, recurred / replays]);
+  const y = (share) => top + height - share * height;
+  context.strokeStyle = colours.grid;
+  context.lineWidth = 1;
+  context.strokeRect(axis.left, top, axis.right - axis.left, height);
+  context.strokeStyle = colours.danger;
+  context.fillStyle = colours.danger;
+  context.lineWidth = 1.6;
+  context.beginPath();
+  for (const [atS, share] of [...shares, [foundS, 1]]) context.lineTo(axis.xOf(atS), y(share));
+  context.stroke();
+  for (const [atS, share] of shares) {
+    context.beginPath();
+    context.arc(axis.xOf(atS), y(share), 2.5, 0, 2 * Math.PI);
+    context.fill();
+  }
+  drawScale(box, [0, 1], "", 0);
 }
 
 /** @param {Box} box */

@@ -1,19 +1,25 @@
 // The film strip: five stills up to the event, to see at a glance and to point at.
 import { el, refill } from "./dom.js";
 import { View } from "./view.js";
-import { atTime } from "./words.js";
+import { atTime, inHundred } from "./words.js";
 
 /** @import { Event, Recording } from "./moment.js" */
 export const STILL_LAYERS = new Set(["truth", "signals"]);
 
 /**
- * The five moments of a scenario: four seconds up to its event, or evenly through it.
+ * The five moments of a scenario: four seconds up to its event, or evenly through it. The moment from which on it was likely
+ * takes the place of the nearest.
  * @param {Recording} recording
  * @param {Event | null} event
  */
 function stillTimes(recording, event) {
   if (!event) return [0, 0.25, 0.5, 0.75, 1].map((share) => share * recording.endS);
-  return [-4, -2.5, -1.5, -0.5, 0].map((before) => Math.max(0, event.at_s + before));
+  const times = [-4, -2.5, -1.5, -0.5, 0].map((before) => Math.max(0, event.at_s + before));
+  const rise = recording.rise();
+  if (!rise) return times;
+  const apart = times.slice(0, -1).map((timeS) => Math.abs(timeS - rise.at_s));
+  times[apart.indexOf(Math.min(...apart))] = rise.at_s;
+  return times.sort((one, other) => one - other);
 }
 
 /**
@@ -47,7 +53,8 @@ export function drawStrip(place, recording, road, seek, peek) {
   const stills = times.map((timeS, i) => {
     const canvas = el("canvas", { "aria-hidden": "true" });
     const isLast = i === times.length - 1 && event;
-    const caption = `${atTime(timeS)}${isLast ? ` · ${event.what}` : ""}`;
+    const share = timeS === recording.rise()?.at_s ? ` · from here in ${inHundred(recording.rise())}` : "";
+    const caption = `${atTime(timeS)}${isLast ? ` · ${event.what}` : share}`;
     const view = new View(canvas, recording, road, STILL_LAYERS);
     views.push([view, timeS]);
     return el(

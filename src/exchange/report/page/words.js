@@ -1,6 +1,6 @@
 // What the engine's short words mean, and figures as people read them.
 
-/** @import { Breach, Finding, Recurrence, Summary } from "./data" */
+/** @import { Branched, Breach, Finding, Recurrence, Summary } from "./data" */
 
 export const VERDICTS = {
   avoidable: "a careful driver would have avoided it",
@@ -77,6 +77,12 @@ export function recursInWords(finding) {
   if (!recurrence) return "not tried";
   return recurrence.word;
 }
+
+/**
+ * The share of branches in which a finding happened again.
+ * @param {Branched} branches
+ */
+export const inHundred = ({ recurred, replays }) => `${Math.round((100 * recurred) / replays)} %`;
 
 /** What an impact means for people, by the word of the page's data. */
 export const HARMS = {
