@@ -34,6 +34,9 @@ pub enum Failure {
     /// An external driving system failed.
     #[error("the driving system failed {count}", count = super::output::plural(*findings, "time"))]
     Ads { findings: usize },
+    /// Findings of which nothing says whether they recur, because an external driving system failed in their replays.
+    #[error("{count} could not be played again", count = super::output::plural(*findings, "finding"))]
+    Unreplayed { findings: usize },
     /// Checks of an external driving system that it does not pass.
     #[error("{count} not passed", count = super::output::plural(*checks, "check"))]
     Unfit { checks: usize },
@@ -74,7 +77,10 @@ impl Failure {
             | Failure::NotPlayed { in_source: true, .. } => 2,
             Failure::Refuted { .. } => 3,
             Failure::Found { .. } | Failure::Failing { .. } => 4,
-            Failure::Ads { .. } | Failure::Unfit { .. } | Failure::Unreached { .. } => 5,
+            Failure::Ads { .. }
+            | Failure::Unreplayed { .. }
+            | Failure::Unfit { .. }
+            | Failure::Unreached { .. } => 5,
             // A shell reports this status for a process that SIGINT ended.
             Failure::Stopped | Failure::Interrupted { .. } => 130,
         }

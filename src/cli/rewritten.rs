@@ -6,6 +6,12 @@ use avastra_lang::model::Avoidability;
 use avastra_lang::model::vocabulary::{RECURRENCE, Word};
 use avastra_lang::syntax::ast::{self, ClauseKind, Doc, Expect, ExprKind, FileId, Span};
 
+/// The subject of a claim: its kind, and the number of the obstacle or the requirement.
+type About<'a> = (&'a str, Option<&'a str>);
+
+/// The kind of claims about a recurrence from a moment on.
+const FROM_A_MOMENT: &str = "recurrence at";
+
 /// A scenario's file with these `fields` of its origin taken from another text of it. The other text's claims replace the
 /// refuted ones. Everything else stays: other claims, comments, ends of lines.
 pub fn rewritten(text: &str, anew: &str, is_refuted: &[bool], fields: &[&str]) -> String {
@@ -30,24 +36,26 @@ pub fn rewritten(text: &str, anew: &str, is_refuted: &[bool], fields: &[&str]) -
 }
 
 /// A scenario's file with the claims `anew` about the recurrence of a collision or a breach from moments on, in place of those that
-/// it has; `whom` is the number of the road user, or the requirement. `None` if the file claims nothing of it.
+/// it has; `whom` is the number of the road user, or the requirement. A claim about a collision that names nobody is one about it.
+/// `None` if the file claims nothing.
 pub fn with_moments(text: &str, whom: &str, anew: &[String]) -> Option<String> {
     let file = parsed(text);
     let (scenario, _) = scenario_of(&file)?;
-    let (old, others): (Vec<&Expect>, Vec<&Expect>) = scenario
-        .expects
-        .iter()
-        .filter(|expect| about(expect).1 == Some(whom))
-        .partition(|expect| about(expect).0 == FROM_A_MOMENT);
-    let last = range(others.last()?.span);
-    let line = text[..last.start].rfind('\n').map_or(0, |end| end + 1);
-    let indent = &text[line..last.start];
+    let claims: Vec<(About, Range<usize>)> =
+        scenario.expects.iter().map(|expect| (about(expect), range(expect.span))).collect();
+    let is_old = |about: &About| about.0 == FROM_A_MOMENT && about.1.is_none_or(|named| named == whom);
+    let mut places = claims.iter().filter(|(about, _)| !is_old(about));
+    let last = places.clone().rfind(|(about, _)| about.1 == Some(whom)).or_else(|| places.next_back());
+    let place = &last.or_else(|| claims.last())?.1;
+    let line = text[..place.start].rfind('\n').map_or(0, |end| end + 1);
+    let indent = &text[line..place.start];
     let indent = if indent.trim().is_empty() { indent } else { "  " };
     // Behind a comment of the same line.
-    let rest = text[last.end..].split(['\r', '\n']).next().unwrap_or("");
-    let end = if rest.trim_start().starts_with("//") { last.end + rest.len() } else { last.end };
+    let rest = text[place.end..].split(['\r', '\n']).next().unwrap_or("");
+    let end = if rest.trim_start().starts_with("//") { place.end + rest.len() } else { place.end };
+    let old = claims.iter().filter(|(about, _)| is_old(about));
     let mut edits: Vec<(Range<usize>, String)> =
-        old.iter().map(|expect| (with_separator(text, range(expect.span)), String::new())).collect();
+        old.map(|(_, span)| (with_separator(text, span.clone()), String::new())).collect();
     edits.push((end..end, anew.iter().map(|claim| format!("\n{indent}expect {claim}")).collect()));
     Some(edited(text, edits))
 }
@@ -67,22 +75,26 @@ fn edited(text: &str, mut edits: Vec<(Range<usize>, String)>) -> String {
     result + &text[at..]
 }
 
-/// The subject of a claim: its kind, and the number of the obstacle or the requirement.
-type About<'a> = (&'a str, Option<&'a str>);
-
-/// The kind of claims about a recurrence from a moment on.
-const FROM_A_MOMENT: &str = "recurrence at";
-
 /// Replaces claims that do not hold. The new claim is of the same kind and about the same obstacle, or else about an
 /// obstacle for which the file has no claim of that kind. A claim without such a replacement goes.
 fn claim_edits(
     (text, old): (&str, &[Expect]),
     (anew, new): (&str, &[Expect]),
-    is_refuted: &[bool],
+    is_refuted_by: &[bool],
 ) -> Vec<(Range<usize>, String)> {
     let claimed: Vec<About> = old.iter().map(about).collect();
     let mut left: Vec<(About, &Expect)> = new.iter().map(|expect| (about(expect), expect)).collect();
-    let refuted = old.iter().zip(&claimed).zip(is_refuted).filter(|(_, is_refuted)| **is_refuted);
+    // The moments of a finding hold together: a curve without its middle would mislead.
+    let is_refuted: Vec<bool> = claimed
+        .iter()
+        .zip(is_refuted_by)
+        .map(|(about, is_refuted)| {
+            let of_same =
+                claimed.iter().zip(is_refuted_by).any(|(other, refuted)| *refuted && other == about);
+            *is_refuted || about.0 == FROM_A_MOMENT && of_same
+        })
+        .collect();
+    let refuted = old.iter().zip(&claimed).zip(&is_refuted).filter(|(_, is_refuted)| **is_refuted);
     let edit = |((expect, known), _): ((&Expect, &About), &bool)| {
         let is_new = |found: &About| found.0 == known.0 && !claimed.contains(found);
         let same = left.iter().position(|(found, _)| found == known);
@@ -246,13 +258,43 @@ scenario s {
 }
 ";
         assert_eq!(claims, wanted);
-        let text = with_moments(&now, "2", &["recurrence == 0 / 4 with npc#2 at 1.0 s".to_owned()]).unwrap();
-        let anew = with_moments(&text, "2", &["recurrence == 1 / 9 with npc#2 at 2.0 s".to_owned()]).unwrap();
-        let behind = "unavoidable with npc#2 // by hand\n  expect recurrence == 1 / 9 with npc#2 at 2.0 s\n  expect proc";
-        assert!(anew.contains(behind) && !anew.contains("0 / 4"), "{anew}");
-        assert_eq!(with_moments(&now, "3", &[]), None);
         // A file keeps its ends of lines.
         let crlf = |text: &str| text.replace('\n', "\r\n");
         assert_eq!(rewritten(&crlf(OLD), NEW, &[true; 5], &[]), crlf(&now));
+    }
+
+    #[test]
+    fn moments_take_the_place_of_those_that_were_claimed() {
+        let claims = |text: &str, whom: &str, anew: &[&str]| {
+            let anew: Vec<String> = anew.iter().map(|&claim| claim.to_owned()).collect();
+            with_moments(text, whom, &anew)
+        };
+        let one = "recurrence == 0 / 4 with npc#1 at 1.0 s";
+        let other = "recurrence == 1 / 9 with npc#1 at 2.0 s";
+        let once = claims(OLD, "1", &[one, other]).unwrap();
+        let lines = format!("  expect minimal with npc#1\n  expect {one}\n  expect {other}\n  expect proc");
+        assert!(once.contains(&lines), "{once}");
+        assert_eq!(claims(&once, "1", &[one, other]).unwrap(), once);
+        assert_eq!(claims(&once, "1", &[]).unwrap(), OLD);
+        // Behind a comment, and with the file's ends of lines.
+        let commented = OLD.replace("  expect minimal with npc#1\n", "");
+        let found = claims(&commented.replace('\n', "\r\n"), "1", &[one]).unwrap();
+        assert!(found.contains(&format!("// by hand\r\n  expect {one}\r\n  expect proc")), "{found}");
+        // A claim that names nobody is about the collision, too.
+        let unnamed = OLD.replace(" with npc#1", "").replace("minimal", "recurrence == 2 / 4 at 5 s");
+        let found = claims(&unnamed, "1", &[one]).unwrap();
+        assert!(found.contains(&format!("proc == [0.1]\n  expect {one}\n}}")), "{found}");
+        assert!(!found.contains("2 / 4"), "{found}");
+        assert_eq!(claims("language 1\nscenario s {\n  road: r\n  steps { }\n}\n", "1", &[one]), None);
+    }
+
+    #[test]
+    fn if_one_moment_does_not_hold_all_of_its_finding_go() {
+        let moments = ["0 / 4 with npc#1 at 1 s", "4 / 4 with npc#1 at 2 s", "4 / 4 with npc#2 at 2 s"];
+        let moments = moments.map(|moment| format!("  expect recurrence == {moment}\n"));
+        let old = OLD.replace("  expect minimal with npc#1\n", &moments.concat());
+        let is_refuted = [false, false, false, true, false, false, false];
+        let now = rewritten(&old, OLD, &is_refuted, &[]);
+        assert_eq!(now, OLD.replace("  expect minimal with npc#1\n", &moments[2]));
     }
 }

@@ -160,7 +160,7 @@ fn failed_on(found: &Totals, replays: u32, fail_on: &[FailOn]) -> Result<(), Fai
     }
     // What could not be played again may recur.
     match unreplayed(found, replays) {
-        unknown @ 1.. if asks(FailOn::Recurring) => Err(Failure::Ads { findings: unknown as usize }),
+        unknown @ 1.. if asks(FailOn::Recurring) => Err(Failure::Unreplayed { findings: unknown as usize }),
         _ => Ok(()),
     }
 }
@@ -225,10 +225,10 @@ fn play_all(
     if totals.replayed > 0 && !oracle::can_tell(run.settings().replays) {
         output.say("fewer than 7 replays never show that a finding recurs: `--repeat 20`");
     }
-    if unreplayed(&totals, run.settings().replays) > 0 {
+    let unknown = unreplayed(&totals, run.settings().replays);
+    if unknown > 0 {
         output.warn(&format!(
-            "{} of {} could not be played again, because the driving system failed: nothing says whether they recur",
-            totals.findings - totals.replayed,
+            "{unknown} of {} could not be played again, because the driving system failed: nothing says whether they recur",
             plural(totals.findings as usize, "finding")
         ));
     }

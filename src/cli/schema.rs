@@ -234,7 +234,7 @@ replay
   FAILED
 diagnose
   causes[] object? `cause` (one or two modules, what the finding hangs on, or none) and `count`
-  scenarios[] object `file`, `scenario`; of `modular` its `diagnosis`, of others the `swaps`: what was changed, what became of it, and what it `hangs_on`; with `--moment` when it happened (`found_s`), the `moments` looked at with the branches in which it happened again (`recurred` of `replays`; `failed`: others in which the driving system failed), when more than three quarters did (`rises_s`), and `avoidable_until_s`
+  scenarios[] object `file`, `scenario`; of `modular` its `diagnosis`, of others the `swaps`: what was changed, what became of it, and what it `hangs_on`; with `--moment` when it happened (`found_s`), the `moments` looked at with the branches in which it happened again (`recurred` of `replays`; `failed`: others in which the driving system failed), when more than three quarters did (`rises_s`), `avoidable_until_s`, and with `--write` how many were `written`
   FAILED
 shrink
   median_steps_before number

@@ -146,7 +146,7 @@ impl Small {
             (Some(before), Some(after)) => {
                 format!("recurs in {before} → {after}{}", mixed_text(self.is_mixed))
             }
-            _ => "how often it recurs was not tried, because the file does not claim it".to_owned(),
+            _ => "how often it recurs was not tried: `--repeat 20` tries it".to_owned(),
         };
         let told = [
             Some(format!("kept: {}", kept.join(", "))),

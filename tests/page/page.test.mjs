@@ -118,7 +118,7 @@ test("packed columns come back, of any order, sign and size", async () => {
 
 /** Three ticks of an ego vehicle that gains 1 m a tick; another one is there from tick 1 on. */
 function recording() {
-  const rising = [{ at_s: 0, recurred: 1, replays: 4 }, { at_s: 0.02, recurred: 4, replays: 4 }];
+  const rising = [{ at_s: 0, recurred: 1, replays: 4, is_likely: false }, { at_s: 0.02, recurred: 4, replays: 4, is_likely: true }];
   const columns = [[0, 1, 2], [0, 0, 0], [0, 0.2, 0.4], [50, 50, 50], [5, 7], [0, 0], [1, 0], [4, 6], [0, 2]];
   const ego = { places: [0, 1, 2], brake_lights: [[1, true], [2, false]], length_m: 4.7, width_m: 1.9 };
   for (const name of ["speed_mps", "acceleration_mps2", "steer_rad", "throttle_pct", "brake_pct", "proc"]) ego[name] = 3;

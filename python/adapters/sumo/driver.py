@@ -16,7 +16,8 @@ foresees:
 - One that stands beside the strip is passed slowly if it is a pedestrian.
 - A pedestrian who walks towards the strip on a crosswalk is an obstacle that stands at the crosswalk's edge, whoever would be there first.
 
-It does not foresee who speeds up, starts, or turns without a light. Once the front is beyond the middle of one who comes onto the strip, it drives on.
+It does not foresee who speeds up, starts, or turns without a light. Once the front has passed
+the middle of a road user that comes onto the strip, it drives on.
 Parameters are SUMO's defaults, except the vehicle's own length and brakes, and `sigma` 0: the driver is not meant to dawdle.
 """
 
@@ -154,7 +155,7 @@ class Sumo(avastra.Driver):
             # What reaches beside the vehicle's front is nothing that it could follow.
             if overlaps and beside.station > front and gap < REACH:
                 speed = other.vx * math.cos(beside.heading) + other.vy * math.sin(beside.heading)
-                # No vehicle of SUMO's lane comes nearer. So one that does stands where it will be once the ego vehicle has braked.
+                # No vehicle of SUMO's lane comes nearer. So an oncoming vehicle stands where it will be once the ego vehicle has braked.
                 comes = max(-speed, 0.0) * step.ego.speed / GENTLE
                 yield Leader(f"object {other.id}", max(gap - comes, 0.0), max(speed, 0.0), along)
 

@@ -30,7 +30,7 @@ pub use evidence::{
 };
 pub use kept::{Breached, breached};
 pub use measured::Measure;
-pub use moment::{Branched, NoReturn, no_return, recurrence_from};
+pub use moment::{Branched, NoReturn, is_likely, no_return, recurrence_from};
 pub use recurrence::{MIXED, REPLAYS, Recurrence, Replayed, can_replay, can_tell, mixed_text};
 pub use severity::{Harm, Severity, severity};
 pub use shrink::{Shrunk, Worth, shrink, spare_steps};

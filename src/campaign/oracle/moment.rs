@@ -14,7 +14,7 @@ use avastra_world::sim::DT_S;
 
 use super::avoidable::avoidable_until;
 use super::case::{Case, Found};
-use super::recurrence::{Recurrence, other_reactions};
+use super::recurrence::{Recurrence, counted, other_reactions};
 
 /// Moments are looked at from this long before the finding on, s: as far as careful drivers are taken back.
 const LOOK_BACK_S: f64 = 8.0;
@@ -26,8 +26,8 @@ const AROUND_S: f64 = 0.5;
 /// A finding is likely from a moment on if it happens in more than this share of its branches. Above one half, because many chances
 /// stay near that for a long time.
 const LIKELY: f64 = 0.75;
-/// So many times as many branches may tell whether a moment lies before the rise or after it: 20 put the rise of a slowly rising
-/// chance up to 0.5 s away from where 400 put it.
+/// Factor on the number of branches for moments that decide where the rise is. With 20 branches, a slowly rising chance seemed to
+/// rise up to 0.5 s away from where 400 put it.
 const CLOSER: u32 = 5;
 /// A chance at most this high counts as low, and one of at least its complement as high.
 const LOW: f64 = 0.1;
@@ -64,24 +64,26 @@ impl Branched {
 
     /// Whether it happened again in more than three quarters of the branches.
     pub fn is_likely(&self) -> bool {
-        self.share() > LIKELY
+        is_likely(self.again)
     }
+}
+
+/// Whether a finding is likely from a moment on, by how often it happened again in branches from there.
+pub fn is_likely(again: Recurrence) -> bool {
+    f64::from(again.recurred) > LIKELY * f64::from(again.replays)
 }
 
 impl NoReturn {
     /// The moments that say most, by rising time: the two [`NoReturn::ends`] and those on both sides of the rise; without a rise,
     /// the first and the last.
     pub fn telling(&self) -> Vec<&Branched> {
-        if self.rises_s.is_none() {
-            return self.moments.iter().take(1).chain(self.moments.iter().skip(1).last()).collect();
-        }
-        let rise = self.moments.windows(2).find(|pair| Some(pair[1].time_s) == self.rises_s);
-        let rise = rise.map(|pair| [&pair[0], &pair[1]]);
-        let mut told: Vec<&Branched> =
-            self.ends().into_iter().flatten().chain(rise.into_iter().flatten()).collect();
-        told.sort_by(|one, other| one.time_s.total_cmp(&other.time_s));
-        told.dedup();
-        told
+        let (all, ends) = (&self.moments, self.ends());
+        let rise = all.iter().position(|at| Some(at.time_s) == self.rises_s);
+        let is_meant = |index: usize| match rise {
+            Some(rise) => index == rise || index + 1 == rise || ends.contains(&Some(&all[index])),
+            None => index == 0 || index + 1 == all.len(),
+        };
+        (0..all.len()).filter(|index| is_meant(*index)).map(|index| &all[index]).collect()
     }
 
     /// The last moment with a low chance before the rise, and the first with a high one after it.
@@ -127,6 +129,8 @@ pub fn no_return(setup: &Setup, log: &EpisodeLog, found: Found, most: u32) -> No
         }
         high_s
     });
+    // Where the driving system failed in every branch, nothing is known, so nothing is said of a rise.
+    let rises_s = rises_s.filter(|_| looked.moments.iter().all(|at| at.again.replays > 0));
     let avoidable_until_s = match found {
         Found::Collision(index) => avoidable_until(setup, &Script::of_log(log), log, index),
         Found::Breach(_) => None,
@@ -155,8 +159,9 @@ impl Looked<'_> {
         if let Some(known) = self.moments.iter().find(is_known) {
             return *known;
         }
-        let is_known = |again: Recurrence| again.is_below(LIKELY) || again.is_above(LIKELY);
-        let (again, number) = branches(self.case, time_s, most, is_known);
+        let is_settled = |again: Recurrence| again.is_below(LIKELY) || again.is_above(LIKELY);
+        let tells = |number| self.case.tells(&branch(self.case, time_s, number));
+        let (again, number) = counted(most, is_settled, tells);
         let branched = Branched { time_s, again, failed: number - again.replays };
         self.moments.push(branched);
         branched
@@ -172,27 +177,16 @@ pub fn recurrence_from(
     from_s: f64,
     replays: u32,
 ) -> Recurrence {
-    branches(&Case::new(setup, log, found), from_s, 2 * replays, |again| again.replays == replays).0
+    let case = Case::new(setup, log, found);
+    counted(
+        2 * replays,
+        |again| again.replays == replays,
+        |number| case.tells(&branch(&case, from_s, number)),
+    )
+    .0
 }
 
-/// Plays branches from a moment until it is enough, `most` at most; and how many were played.
-fn branches(
-    case: &Case,
-    time_s: f64,
-    most: u32,
-    is_enough: impl Fn(Recurrence) -> bool,
-) -> (Recurrence, u32) {
-    let mut again = Recurrence::default();
-    let mut number = 0;
-    while number < most && !is_enough(again) {
-        number += 1;
-        let told = case.tells(&branch(case, time_s, number));
-        again = told.map_or(again, |is_again| again.and(is_again));
-    }
-    (again, number)
-}
-
-/// The nth branch from a moment, which begins at a tick: so the moments of a file and those that were looked at are the same.
+/// The nth branch from a moment. The time is rounded to a tick, because a file's `6.0 s` and the computed one differ in the last bit.
 fn branch(case: &Case, time_s: f64, number: u32) -> EpisodeLog {
     let time_s = (time_s / DT_S).round() * DT_S;
     let ads = &case.setup.ads;
@@ -214,7 +208,10 @@ mod tests {
         let found = NoReturn { found_s: 3.1, moments, rises_s: Some(2.2), avoidable_until_s: None };
         let ends = found.ends().map(|end| end.map(|at| at.time_s));
         assert_eq!(ends, [Some(2.0), Some(2.3)]);
+        let telling = |found: &NoReturn| found.telling().iter().map(|at| at.time_s).collect::<Vec<_>>();
+        assert_eq!(telling(&found), [2.0, 2.1, 2.2, 2.3]);
         let flat = NoReturn { rises_s: None, ..found };
         assert_eq!(flat.ends(), [None, None]);
+        assert_eq!(telling(&flat), [1.0, 3.0]);
     }
 }

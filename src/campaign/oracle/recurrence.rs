@@ -181,14 +181,7 @@ impl<'a> Replayed<'a> {
         is_enough: impl Fn(Recurrence) -> bool,
         most: u32,
     ) -> Recurrence {
-        let mut so_far = Recurrence::default();
-        for number in 1..=most {
-            so_far = self.nth(number, &fails).map_or(so_far, |has_failed| so_far.and(has_failed));
-            if is_enough(so_far) {
-                break;
-            }
-        }
-        so_far
+        counted(most, is_enough, |number| self.nth(number, &fails)).0
     }
 
     /// Whether one of several findings of the log happens again in a play; `None` if the obstacle of none appears there.
@@ -204,14 +197,7 @@ impl<'a> Replayed<'a> {
 
     fn until(&self, found: Found, most: u32, is_enough: impl Fn(Recurrence) -> bool) -> Recurrence {
         let case = Case::new(self.setup, self.log, found);
-        let mut so_far = Recurrence::default();
-        let mut number = 0;
-        while !is_enough(so_far) && number < most {
-            number += 1;
-            let told = self.nth(number, |play| case.tells(play));
-            so_far = told.map_or(so_far, |is_again| so_far.and(is_again));
-        }
-        so_far
+        counted(most, is_enough, |number| self.nth(number, |play| case.tells(play))).0
     }
 
     /// Looks at the nth play, from 1.
@@ -223,6 +209,21 @@ impl<'a> Replayed<'a> {
         }
         look(&again[number as usize - 1])
     }
+}
+
+/// Counts plays, from the first on, until it is enough, `most` at most; and how many were played. `tells` says of the nth whether the
+/// finding happened again, `None` if it says nothing.
+pub(super) fn counted(
+    most: u32,
+    is_enough: impl Fn(Recurrence) -> bool,
+    tells: impl Fn(u32) -> Option<bool>,
+) -> (Recurrence, u32) {
+    let (mut so_far, mut number) = (Recurrence::default(), 0);
+    while number < most && !is_enough(so_far) {
+        number += 1;
+        so_far = tells(number).map_or(so_far, |is_again| so_far.and(is_again));
+    }
+    (so_far, number)
 }
 
 fn with_a_step_more(script: &Script) -> Script {

@@ -146,6 +146,9 @@ impl Played<'_> {
                 let from_s = from.map(|from| from.si());
                 match found.map(|found| (replays.recurrence)(found, from_s, *wanted)) {
                     Err(none) => judged(claim, Err(none)),
+                    Ok(Ok(found)) if found.replays < *wanted => {
+                        untried(claim, "not tried (the driving system failed in too many replays)")
+                    }
                     Ok(Ok(found)) if found.recurred == *recurred => judged(claim, Ok(())),
                     Ok(Ok(found)) => judged(claim, Err(found.to_string())),
                     Ok(Err(no_tries)) => untried(claim, no_tries),

@@ -497,9 +497,9 @@ pub struct Totals {
     pub episodes_with_counted: i64,
     /// Episodes in which a requirement was breached.
     pub episodes_with_breach: i64,
-    /// Counted collisions and requirements breached, one for each episode; those that were played again under other chance; and
-    /// those of them that recur, as [`Recurrence::recurs`] says.
+    /// Counted collisions and breached requirements. A requirement counts once an episode.
     pub findings: i64,
+    /// Those that were played again under other chance, and those of them that recur, as [`Recurrence::recurs`] says.
     pub replayed: i64,
     pub recurring: i64,
     /// Those of them that are counted collisions.

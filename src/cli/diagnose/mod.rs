@@ -75,13 +75,15 @@ fn result(
 struct Case<'a> {
     stage: Stage<'a>,
     ads: Selected,
+    /// Whether that is the driving system that the scenario records.
+    is_recorded: bool,
     log: EpisodeLog,
     found: Found,
 }
 
 impl Case<'_> {
     fn of<'a>(table: &'a ActionTable, scenario: &'a Scenario, asked: &Asked) -> Result<Case<'a>, Failure> {
-        let (ads, _) = asked.selected_for(scenario)?;
+        let (ads, is_recorded) = asked.selected_for(scenario)?;
         let stage = Stage::new(table, scenario)?;
         let (log, _, found) = stage.first_found(&ads);
         if let (None, Some(failure)) = (found, &log.failure) {
@@ -98,7 +100,7 @@ impl Case<'_> {
                 stage.lack_in_words()
             )));
         };
-        Ok(Case { stage, ads, log, found })
+        Ok(Case { stage, ads, is_recorded, log, found })
     }
 }
 
@@ -169,7 +171,7 @@ fn explain(
     file: &Path,
 ) -> Result<Explained, Failure> {
     let (table, scenario) = look::unchanged(output, file)?;
-    let Case { stage, ads, log, found } = Case::of(&table, &scenario, asked)?;
+    let Case { stage, ads, log, found, .. } = Case::of(&table, &scenario, asked)?;
     let setup = stage.setup(&ads);
     let why = if arguments.outside || ads.profile().is_none() && baseline.is_none() {
         if !oracle::can_replay(&ads) {

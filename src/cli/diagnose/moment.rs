@@ -1,20 +1,21 @@
 //! `diagnose --moment`: from when on a finding was all but certain.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use avastra_base::outside::Shown;
 use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::oracle;
 use avastra_campaign::oracle::{Branched, Found, NoReturn};
 use avastra_campaign::run::Asked;
-use avastra_lang::model::Space;
+use avastra_lang::model::{Scenario, Space};
 
 use super::super::arguments::DiagnoseArguments;
 use super::super::error::Failure;
 use super::super::files::write_again;
 use super::super::findings::needs_program;
+use super::super::load::read;
 use super::super::look;
-use super::super::output::Output;
+use super::super::output::{Output, plural};
 use super::super::parallel::each_file;
 use super::super::rewritten::with_moments;
 use super::{Case, result};
@@ -23,26 +24,39 @@ use super::{Case, result};
 pub fn moments(output: &Output, arguments: &DiagnoseArguments, asked: &Asked) -> Result<(), Failure> {
     let found = each_file(output, &arguments.many, asked.external.as_ref(), |file| {
         let (table, scenario) = look::unchanged(output, file)?;
-        let Case { stage, ads, log, found } = Case::of(&table, &scenario, asked)?;
+        let Case { stage, ads, is_recorded, log, found } = Case::of(&table, &scenario, asked)?;
         if !oracle::can_replay(&ads) {
             return Err(needs_program(&scenario.name, "branch"));
         }
-        let risen = oracle::no_return(&stage.setup(&ads), &log, found, oracle::REPLAYS);
         if arguments.write {
-            write(file, table.space(), &log, found, &risen)?;
+            may_be_written(&scenario, is_recorded)?;
         }
-        Ok((file.clone(), scenario.name.clone(), found.noun(), risen))
+        let risen = oracle::no_return(&stage.setup(&ads), &log, found, oracle::REPLAYS);
+        let written = if arguments.write { write(file, table.space(), &log, found, &risen)? } else { 0 };
+        Ok(Moments {
+            file: file.clone(),
+            scenario: scenario.name.clone(),
+            noun: found.noun(),
+            risen,
+            written,
+        })
     })?;
-    for (file, _, noun, risen) in &found.done {
-        output.say(&format!("{}: {}", file.shown(), moment_text(noun, risen)));
+    for Moments { file, noun, risen, written, .. } in &found.done {
+        let written = match written {
+            _ if !arguments.write => String::new(),
+            0 => "; nothing written, because the driving system failed in most branches".to_owned(),
+            _ => format!("; {} written", plural(*written, "moment")),
+        };
+        output.say(&format!("{}: {}{written}", file.shown(), moment_text(noun, risen)));
         if found.is_single() {
             let line =
                 |at: &Branched| format!("  {:>6.1} s  {:<12} {}", at.time_s, bar(at.share()), at.again);
             output.say(&risen.moments.iter().map(line).collect::<Vec<_>>().join("\n"));
         }
     }
-    let scenarios = found.done.iter().map(|(file, scenario, _, risen)| {
-        let mut told = serde_json::json!({ "file": file, "scenario": scenario });
+    let scenarios = found.done.iter().map(|Moments { file, scenario, risen, written, .. }| {
+        let written = arguments.write.then_some(written);
+        let mut told = serde_json::json!({ "file": file, "scenario": scenario, "written": written });
         let risen = serde_json::to_value(risen).expect("it is plain data");
         if let (Some(told), Some(risen)) = (told.as_object_mut(), risen.as_object()) {
             told.extend(risen.clone());
@@ -53,22 +67,46 @@ pub fn moments(output: &Output, arguments: &DiagnoseArguments, asked: &Asked) ->
     found.complete("explained")
 }
 
-/// Writes the moments that say most into the scenario's file, in place of those that it has.
+/// The moments of a scenario's finding.
+struct Moments {
+    file: PathBuf,
+    scenario: String,
+    noun: &'static str,
+    risen: NoReturn,
+    /// How many were written into the file.
+    written: usize,
+}
+
+/// Refuses what would make false claims, before any branch is played.
+fn may_be_written(scenario: &Scenario, is_recorded: bool) -> Result<(), Failure> {
+    let name = &scenario.name;
+    match () {
+        () if !is_recorded => Err(Failure::usage(format!(
+            "`{name}` records another driving system, and its claims are about that: leave `--ads` or `--write` out"
+        ))),
+        () if scenario.claims.is_empty() => Err(Failure::usage(format!(
+            "`{name}` claims nothing: write `expect collision` into it, and the moments go below"
+        ))),
+        () => Ok(()),
+    }
+}
+
+/// Writes the moments that say most into the scenario's file, in place of those that it has, and says how many.
 fn write(
     file: &Path,
     space: &Space,
     log: &EpisodeLog,
     found: Found,
     risen: &NoReturn,
-) -> Result<(), Failure> {
+) -> Result<usize, Failure> {
     let (of, with, whom) = match found {
         Found::Collision(index) => {
             let number = log.collisions[index].contact.obstacle;
             (String::new(), format!(" with npc#{number}"), number.to_string())
         }
         Found::Breach(index) => {
-            let name = space.requirements[log.breaches[index].requirement].name.clone();
-            (format!("{name}."), String::new(), name)
+            let name = &space.requirements[log.breaches[index].requirement].name;
+            (format!("{name}."), String::new(), name.clone())
         }
     };
     // A claim is checked in at most twice as many branches as it counts.
@@ -77,15 +115,12 @@ fn write(
         format!("{of}recurrence == {} / {}{with} at {time_s:.1} s", again.recurred, again.replays)
     };
     let claims: Vec<String> = told.map(claim).collect();
-    let text = std::fs::read_to_string(file).map_err(Failure::usage)?;
-    let text = with_moments(&text, &whom, &claims).ok_or_else(|| {
-        Failure::usage(format!(
-            "{} claims nothing of the {}: nothing was written",
-            file.shown(),
-            found.noun()
-        ))
-    })?;
-    write_again(file, &text)
+    if !claims.is_empty() {
+        let text = read(file).map_err(|error| Failure::file("read", file, error))?;
+        let text = with_moments(&text, &whom, &claims).expect("it claims something");
+        write_again(file, &text)?;
+    }
+    Ok(claims.len())
 }
 
 /// When a finding became certain, in words.

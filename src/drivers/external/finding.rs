@@ -62,7 +62,7 @@ problems! {
     OutOfRange = "out_of_range": Protocol, "compare the message with `avastra ads schema`";
     WrongSeq = "wrong_seq": Protocol, "repeat the `seq` of the step in its answer";
     Twice = "twice": Protocol, "answer each step once, and no `event`";
-    Unasked = "unasked": Protocol, "wait for each question, and answer it once";
+    Unasked = "unasked": Protocol, "answer each question once, after it came, and no `event`";
     WrongProtocol = "wrong_protocol": Protocol, "this avastra speaks avastra-ads/1";
     Stderr = "stderr": Flood, "print less: 64 MiB in an episode are a flood";
     Reported = "reported": Error, "the program says so itself";

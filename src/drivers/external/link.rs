@@ -107,8 +107,9 @@ pub struct Link {
     written: usize,
     /// Room for what is read at once.
     chunk: Vec<u8>,
-    /// Bytes that were read, the first of which are taken.
+    /// Bytes that were read.
     read: Vec<u8>,
+    /// How many bytes of `read` are taken.
     taken: usize,
     /// From the first that is not taken up to here, `read` has no end of a line.
     searched: usize,
@@ -217,7 +218,7 @@ impl Link {
         }
     }
 
-    /// A line that is there before anything was asked; a last one before the end of the output is no matter here.
+    /// A whole line that was written before the question. An unfinished line is left.
     ///
     /// # Errors
     /// If it is too long.
@@ -478,7 +479,11 @@ fn start(words: &[String], settings: &ExternalSettings) -> Result<Ends, String> 
         command.current_dir(directory);
     }
     let spawned = with_no_signal_blocked(|| command.spawn());
-    let mut child = spawned.map_err(|error| format!("`{}` cannot be started: {error}", words[0]))?;
+    let mut child = spawned.map_err(|error| {
+        let hint =
+            if error.kind() == ErrorKind::PermissionDenied { "; `chmod +x` makes it a program" } else { "" };
+        format!("`{}` cannot be started: {error}{hint}", words[0])
+    })?;
     groups().extend(i32::try_from(child.id()));
     let (stdin, stdout, stderr) = (child.stdin.take(), child.stdout.take(), child.stderr.take());
     let stdout = stdout.expect("it was asked for");

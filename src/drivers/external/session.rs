@@ -126,7 +126,7 @@ impl Session {
         Patience { limit_s, waits_for_late }: Patience,
     ) -> Result<Option<(Answer, f64)>, Failure> {
         let wanted = self.identity.answer.name();
-        let asked = self.send(line);
+        let asked = self.send(line, Some(seq));
         let deadline = Deadline::after(limit_s);
         let mut found = asked.and_then(|()| self.answer(wanted, Some(seq), deadline));
         if waits_for_late && matches!(found, Err(Broken { problem: Problem::NoAnswer, .. })) {
@@ -166,21 +166,28 @@ impl Session {
 
     /// Sends a line that is no step and waits for its answer, that of a type.
     fn ask(&mut self, line: &str, wanted: &str, limit_s: f64) -> Result<Answer, Broken> {
-        self.send(line)?;
+        self.send(line, None)?;
         self.answer(wanted, None, Deadline::after(limit_s))
     }
 
-    /// Sends a question. Whatever is there before it answers nothing, unless a step was missed.
-    fn send(&mut self, line: &str) -> Result<(), Broken> {
-        if !self.missed
-            && let Some(line) = self.link.unasked()?
-        {
-            return Err(match read(&line, "ready")?.seq() {
-                Some(seq) if Some(seq) == self.answered => twice(seq),
+    /// Sends a question; `seq` is that of a step. A line that came before it is a failure. After a step was missed, the late answers
+    /// to it and to steps before it are none.
+    fn send(&mut self, line: &str, seq: Option<u64>) -> Result<(), Broken> {
+        while let Some(found) = self.link.unasked()? {
+            let answered = match read(&found, "ready") {
+                Ok(answer) => answer.seq(),
+                Err(broken) if broken.problem == Problem::WrongType => None,
+                Err(broken) => return Err(broken),
+            };
+            match answered {
+                Some(found) if self.missed && seq.is_none_or(|seq| found < seq) => {}
+                Some(seq) if Some(seq) == self.answered => return Err(twice(seq)),
                 _ => {
-                    Broken { problem: Problem::Unasked, detail: format!("it wrote {} unasked", shown(&line)) }
+                    let before = if seq.is_some() { "" } else { ", after the end of the episode before" };
+                    let detail = format!("it wrote {} unasked{before}", shown(&found));
+                    return Err(Broken { problem: Problem::Unasked, detail });
                 }
-            });
+            }
         }
         self.link.send(line);
         Ok(())

@@ -297,7 +297,7 @@ fn collision(
         "evasion": judgement.evasion, "priority": contact.ruling.priority.name(), "ruling": contact.ruling.describe(), "side": severity.side, "approach": severity.approach,
         "ego_mps": contact.ego_speed_mps, "closing_mps": severity.closing_speed_mps, "delta_v_mps": severity.delta_v_mps,
         "other_delta_v_mps": severity.obstacle_delta_v_mps, "harm": severity.harm.name(), "harm_share": rounded(severity.harm_share),
-        "recurrence": recurrence((scenario, log), is_meant), "moments": moments(scenario, is_meant), "sudden": facts.sudden, "struck": facts.struck, "cause": cause,
+        "recurrence": recurrence((scenario, log), is_meant), "moments": moments(scenario, contact.time_s, is_meant), "sudden": facts.sudden, "struck": facts.struck, "cause": cause,
         "held": log.held_at(contact.time_s).map(Held::text), "ways": ways,
     })
 }
@@ -328,7 +328,7 @@ fn breaches(table: &ActionTable, scenario: &Scenario, log: &EpisodeLog) -> Vec<V
             "requirement": name, "obstacle": breach.obstacle, "docs": docs.join(" "), "formula": formula, "at_s": breach.time_s, "until_s": breach.until_s,
             "margin": breach.margin.map(rounded), "unit": unit, "kept_by": kept_by,
             "recurrence": recurrence((scenario, log), |requirement, _| requirement == Some(name)),
-            "moments": moments(scenario, |requirement, _| requirement == Some(name)),
+            "moments": moments(scenario, breach.time_s, |requirement, _| requirement == Some(name)),
         })
     };
     log.breaches.iter().map(told).collect()
@@ -373,13 +373,21 @@ fn recurrence(
     }))
 }
 
-/// How often it recurs from moments of the episode on, as the file claims.
-fn moments(scenario: &Scenario, is_meant: impl Fn(Option<&str>, Option<Obstacle>) -> bool) -> Vec<Value> {
-    let told = |(from, found): (Option<Figure>, Recurrence)| {
-        let Recurrence { recurred, replays } = found;
-        Some(json!({ "at_s": from?.si(), "recurred": recurred, "replays": replays }))
+/// How often a finding recurs from moments before it on, as the file claims, by rising time.
+fn moments(
+    scenario: &Scenario,
+    found_s: f64,
+    is_meant: impl Fn(Option<&str>, Option<Obstacle>) -> bool,
+) -> Vec<Value> {
+    let timed = |(from, again): (Option<Figure>, Recurrence)| Some((from?.si(), again));
+    let all = recurrences(scenario, is_meant).filter_map(timed);
+    let mut all: Vec<(f64, Recurrence)> = all.filter(|(from_s, _)| *from_s < found_s).collect();
+    all.sort_by(|(one_s, _), (other_s, _)| one_s.total_cmp(other_s));
+    let told = |(from_s, again): (f64, Recurrence)| {
+        let Recurrence { recurred, replays } = again;
+        json!({ "at_s": from_s, "recurred": recurred, "replays": replays, "is_likely": oracle::is_likely(again) })
     };
-    recurrences(scenario, is_meant).filter_map(told).collect()
+    all.into_iter().map(told).collect()
 }
 
 /// All that the file claims of the recurrence of the finding that is meant: from the start, or from a moment on.

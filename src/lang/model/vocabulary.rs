@@ -230,7 +230,7 @@ pub const KEPT: (&str, &str) = (
 /// `stops_at_red.recurrence == 14 / 20`: how often it is breached again, as [`ScenarioClaim::Recurrence`] of a collision.
 pub const RECURRENCE: (&str, &str) = (
     "recurrence",
-    "How often it is breached again with other sensor errors and reactions: `expect stops_at_red.recurrence == 14 / 20`.",
+    "How often it is breached again with other sensor errors and reactions: `expect stops_at_red.recurrence == 14 / 20`, or from a moment on: `… at 3.8 s`.",
 );
 
 /// `since(vehicles)`: spelt like a function, but of an action or a group.
@@ -429,7 +429,7 @@ words! {
     Cause "cause" = "The module at fault: `expect cause == perception`.",
     Priority "priority" = "Who had priority in a collision: `expect priority == other with npc#2`.",
     End "end" = "How the episode ends: `expect end == arrived`.",
-    Recurrence "recurrence" = "How often the collision happens again with other sensor errors and reactions: `expect recurrence == 14 / 20 with npc#2`.",
+    Recurrence "recurrence" = "How often the collision happens again with other sensor errors and reactions: `expect recurrence == 14 / 20 with npc#2`, or from a moment on: `… at 3.8 s`.",
     Minimal "minimal" = "Without any one of its steps the scenario loses its crash.",
     Trace "trace" = "The digest of the whole state stream: `expect trace == \"sha256:…\"`.",
 }

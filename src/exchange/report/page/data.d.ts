@@ -126,6 +126,7 @@ export interface Branched {
   at_s: number;
   recurred: number;
   replays: number;
+  is_likely: boolean;
 }
 
 export interface Breach {

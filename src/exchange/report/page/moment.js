@@ -287,20 +287,22 @@ export class Recording {
   }
 
   /**
-   * What the file claims of the chance of its finding, from moments on.
+   * The finding of its event, if the file claims how the chance of it rose.
    * @returns {{ at_s: number, moments: Branched[] } | null}
    */
   chances() {
-    const findings = [...this.header.collisions, ...this.header.summary.breaches];
-    return findings.find(({ moments }) => moments.length > 0) ?? null;
+    const found = this.collision() ?? this.header.summary.breaches[0];
+    return found && found.moments.length > 0 ? found : null;
   }
 
   /**
-   * The first moment from which on its finding was likely: in more than three quarters of the branches.
+   * The first moment from which on its finding was likely, and before which it was not.
    * @returns {Branched | null}
    */
   rise() {
-    return this.chances()?.moments.find(({ recurred, replays }) => recurred > 0.75 * replays) ?? null;
+    const moments = this.chances()?.moments ?? [];
+    const rise = moments.findIndex((moment) => moment.is_likely);
+    return rise > 0 ? moments[rise] : null;
   }
 
   /**

@@ -245,7 +245,7 @@ function drawMargin(box, { requirement, unit, parts }) {
 }
 
 /**
- * In which share of the branches from a moment on a finding happened again, up to the finding itself.
+ * The share of branches from a moment on in which a finding happened again, up to the finding itself.
  * @param {Box} box
  * @param {{ at_s: number, moments: Branched[] }} chances
  */
