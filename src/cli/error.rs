@@ -34,9 +34,9 @@ pub enum Failure {
     /// An external driving system failed.
     #[error("the driving system failed {count}", count = super::output::plural(*findings, "time"))]
     Ads { findings: usize },
-    /// Findings of which nothing says whether they recur, because an external driving system failed in their replays.
-    #[error("{count} could not be played again", count = super::output::plural(*findings, "finding"))]
-    Unreplayed { findings: usize },
+    /// An external driving system failed in replays, so that they do not say whether a finding recurs.
+    #[error("the driving system failed in {count}", count = super::output::plural(*failed, "replay"))]
+    Replays { failed: usize },
     /// Checks of an external driving system that it does not pass.
     #[error("{count} not passed", count = super::output::plural(*checks, "check"))]
     Unfit { checks: usize },
@@ -78,7 +78,7 @@ impl Failure {
             Failure::Refuted { .. } => 3,
             Failure::Found { .. } | Failure::Failing { .. } => 4,
             Failure::Ads { .. }
-            | Failure::Unreplayed { .. }
+            | Failure::Replays { .. }
             | Failure::Unfit { .. }
             | Failure::Unreached { .. } => 5,
             // A shell reports this status for a process that SIGINT ended.

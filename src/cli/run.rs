@@ -15,7 +15,8 @@ use avastra_campaign::run::{
     PolicyReference, RefusalCount, RequirementCount, Run, RunSettings, Totals, TrafficRecord, play,
 };
 use avastra_drivers::ModularConfig;
-use avastra_drivers::external::{Conversation, Problem};
+use avastra_drivers::external;
+use avastra_drivers::external::{Conversation, Problem, Program};
 use avastra_lang::model::{Policy, Space};
 use avastra_search::agent::{Face, Kind, by_name};
 use avastra_world::action::{ActionTable, Draw};
@@ -104,9 +105,8 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     output.tell(&format!("{}, into {}", heading(&run), directory.path.shown()));
     conditions::ambient_text(&run).iter().for_each(|text| output.tell(text));
     elsewhere.iter().for_each(|text| output.warn(text));
-    let replays = run.settings().replays;
-    let found = play_all(output, (run, directory), elsewhere, arguments.jobs)?;
-    failed_on(&found, replays, &arguments.fail_on)
+    let (found, failed_replays) = play_all(output, (run, directory), elsewhere, arguments.jobs)?;
+    failed_on((&found, failed_replays), &arguments.fail_on)
 }
 
 /// Refuses to fail on what a run cannot find.
@@ -127,7 +127,7 @@ fn can_fail_on(fail_on: &[FailOn], space: &Space, replays: u32) -> Result<(), Fa
 }
 
 /// The failure of a run of which the user asked to fail on something that was found.
-fn failed_on(found: &Totals, replays: u32, fail_on: &[FailOn]) -> Result<(), Failure> {
+fn failed_on((found, failed_replays): (&Totals, u64), fail_on: &[FailOn]) -> Result<(), Failure> {
     let asks = |what| fail_on.contains(&what);
     let counted = |count: i64, what: &str| plural(count as usize, what);
     let what = match () {
@@ -159,15 +159,19 @@ fn failed_on(found: &Totals, replays: u32, fail_on: &[FailOn]) -> Result<(), Fai
         return Err(Failure::Ads { findings: found.failed as usize });
     }
     // What could not be played again may recur.
-    match unreplayed(found, replays) {
-        unknown @ 1.. if asks(FailOn::Recurring) => Err(Failure::Unreplayed { findings: unknown as usize }),
-        _ => Ok(()),
+    if failed_replays > 0 && asks(FailOn::Recurring) {
+        return Err(Failure::Replays { failed: failed_replays as usize });
     }
+    Ok(())
 }
 
-/// Findings that were to be played again and could not be.
-fn unreplayed(found: &Totals, replays: u32) -> i64 {
-    if replays == 0 { 0 } else { found.findings - found.replayed }
+/// How often a program failed beside the episodes in which it did, and the last time.
+fn failed_replays(
+    program: Option<&Arc<Program>>,
+    failed_episodes: u64,
+) -> Option<(u64, Arc<external::Failure>)> {
+    let (failed, last) = program?.failed();
+    Some((failed.checked_sub(failed_episodes).filter(|times| *times > 0)?, last?))
 }
 
 /// Plays the episodes that a directory still lacks, and says what all of them came to. `elsewhere`: how the policy was trained
@@ -177,7 +181,7 @@ fn play_all(
     (run, mut directory): (Run, Directory),
     elsewhere: Option<String>,
     asked_jobs: Option<u32>,
-) -> Result<Totals, Failure> {
+) -> Result<(Totals, u64), Failure> {
     let program = run.arena().program();
     let share = Share::of(&directory.path, run.settings())?;
     // Items are episodes, by their numbers.
@@ -191,12 +195,14 @@ fn play_all(
     let jobs = jobs(asked_jobs, program)?;
     let mut progress = share.progress(output, "counted", &todo);
     let mut driven: Vec<(usize, Arc<Conversation>)> = Vec::new();
+    let mut failed_episodes = 0;
     play(&run, &todo, jobs, &stop, &mut |summary, log| {
         // An episode that was not driven is not kept, so that `--resume` plays it.
         if log.failure.as_ref().is_some_and(|failure| failure.problem == Problem::GivenUp) {
             stop.store(true, Ordering::Relaxed);
             return Ok(());
         }
+        failed_episodes += u64::from(log.failure.is_some());
         keep(&run, &mut directory, &summary, &log)?;
         progress.episode(summary.counted());
         if driven.len() < SPOT_CHECKS && log.failure.is_none() {
@@ -225,11 +231,16 @@ fn play_all(
     if totals.replayed > 0 && !oracle::can_tell(run.settings().replays) {
         output.say("fewer than 7 replays never show that a finding recurs: `--repeat 20`");
     }
-    let unknown = unreplayed(&totals, run.settings().replays);
-    if unknown > 0 {
+    let failed_replays = failed_replays(program, failed_episodes);
+    if let Some((times, last)) = &failed_replays {
+        let (times, unknown) = (plural(*times as usize, "replay"), totals.findings - totals.replayed);
+        let unknown = match unknown {
+            0 => String::new(),
+            _ => format!(" Of {}, nothing says whether they recur.", plural(unknown as usize, "finding")),
+        };
         output.warn(&format!(
-            "{unknown} of {} could not be played again, because the driving system failed: nothing says whether they recur",
-            plural(totals.findings as usize, "finding")
+            "the driving system failed in {times}, which say nothing.{unknown} The last failure: {}",
+            last.in_words()
         ));
     }
     if !refusals.is_empty() {
@@ -300,9 +311,10 @@ fn play_all(
     output.result(serde_json::json!({
         "directory": directory.path, "trained_elsewhere": elsewhere, "totals": totals, "refusals": refusals, "groups": groups,
         "requirements": requirements, "never": never, "critical": critical, "found": found, "kept": kept, "failures": failures, "thinking": program.and_then(|program| program.thinking()), "tests": tests, "tables": tables, "reproducible": is_reproducible,
+        "failed_replays": failed_replays.as_ref().map_or(0, |(times, _)| *times),
     }));
     share.end(output, directory, is_over, program)?;
-    Ok(totals)
+    Ok((totals, failed_replays.map_or(0, |(times, _)| times)))
 }
 
 /// A new run in a new directory. A dry run only says what would be played.

@@ -115,7 +115,8 @@ run
   PLANNED
   directory text the run directory
   trained_elsewhere text? of `--policy`: on which other road, or against which other driving system, profile or traffic, it was trained
-  totals object sums over all episodes: how they ended; `collisions`, those `counted` and their kinds; `findings` (counted collisions and requirements breached, one for each episode), those that were played again (`replayed`), those that recur (`recurring`) and the counted collisions among these (`counted_recurring`); `red_runs`, and episodes with one in which nothing was found (`red_unkept`)
+  totals object sums over all episodes: how they ended; `collisions`, those `counted` and their kinds; `findings` (counted collisions and breached requirements; a requirement counts once an episode), those that were played again (`replayed`), those that recur (`recurring`) and the counted collisions among these (`counted_recurring`); `red_runs`, and episodes with one in which nothing was found (`red_unkept`)
+  failed_replays number replays in which your driving system failed, since the command began: they say nothing
   refusals[] object a reason why actions were refused: `reason` and `times`
   groups[] object a distinct failure: its type among NHTSA's pre-crash types (`precrash`, `precrash_number`), the modules at fault, `count`, how many were played again (`tried`) and recur (`recurring`), an episode that shows it with its own `recurrence`, what happened there
   never.rows number rows of the table

@@ -37,8 +37,8 @@ def called(command, out):
         return json.loads(out.read_text())
     used = cpu_s()
     done = subprocess.run(command, capture_output=True, text=True)
-    if not done.stdout.startswith("{"):
-        sys.exit(f"{' '.join(command)}\n{done.stderr}")
+    if done.returncode in (1, 2) or not done.stdout.startswith("{"):
+        sys.exit(f"{' '.join(command)}\n{done.stdout}{done.stderr}")
     found = {**json.loads(done.stdout), "cpu_s": cpu_s() - used}
     out.write_text(json.dumps(found))
     return found

@@ -184,6 +184,7 @@ fn a_finding_that_cannot_be_played_again_does_not_pass() {
     let totals = &result["totals"];
     assert!(totals["findings"].as_i64() > Some(0) && totals["replayed"] == 0, "{result}{stderr}");
     assert_eq!((status, &totals["failed"]), (5, &0.into()), "{result}{stderr}");
+    assert!(result["failed_replays"].as_i64() > Some(0), "{result}");
 }
 
 #[test]

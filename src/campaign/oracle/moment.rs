@@ -14,7 +14,7 @@ use avastra_world::sim::DT_S;
 
 use super::avoidable::avoidable_until;
 use super::case::{Case, Found};
-use super::recurrence::{Recurrence, counted, other_reactions};
+use super::recurrence::{REPLAYS, Recurrence, counted, other_reactions};
 
 /// Moments are looked at from this long before the finding on, s: as far as careful drivers are taken back.
 const LOOK_BACK_S: f64 = 8.0;
@@ -179,7 +179,7 @@ pub fn recurrence_from(
 ) -> Recurrence {
     let case = Case::new(setup, log, found);
     counted(
-        2 * replays,
+        (2 * replays).max(REPLAYS),
         |again| again.replays == replays,
         |number| case.tells(&branch(&case, from_s, number)),
     )

@@ -151,9 +151,9 @@ impl<'a> Replayed<'a> {
     /// How often a finding of the log happened again in the first `replays`. A collision does if the ego vehicle hits the same
     /// obstacle (and is at fault, if it was), a breach if the requirement is breached. An obstacle that never appears, because
     /// a rule refuses it there, counts as no collision. A replay in which the driving system fails counts only if the finding
-    /// happened before: another one is played for it, with at most twice as many in all.
+    /// happened before: another one is played for it, with at most twice as many in all, or [`REPLAYS`].
     pub fn recurrence(&self, found: Found, replays: u32) -> Recurrence {
-        self.until(found, 2 * replays, |so_far| so_far.replays == replays)
+        self.until(found, (2 * replays).max(REPLAYS), |so_far| so_far.replays == replays)
     }
 
     /// The same in as many replays as are needed to know whether it recurs. At most `most` are played, failed ones included.

@@ -144,6 +144,18 @@ impl Played<'_> {
                     format!("{of}recurrence {recurred} of {wanted}{}{}", with(*obstacle), at(from.as_ref()));
                 let found = self.finding(requirement.as_deref(), *obstacle);
                 let from_s = from.map(|from| from.si());
+                let time_s = |found: Found| match found {
+                    Found::Collision(index) => log.collisions[index].contact.time_s,
+                    Found::Breach(index) => log.breaches[index].time_s,
+                };
+                let is_before = |found: &Found| from_s.is_none_or(|from_s| from_s < time_s(*found));
+                let found = found.and_then(|found| {
+                    if is_before(&found) {
+                        Ok(found)
+                    } else {
+                        Err(format!("it happened before, at {:.2} s", time_s(found)))
+                    }
+                });
                 match found.map(|found| (replays.recurrence)(found, from_s, *wanted)) {
                     Err(none) => judged(claim, Err(none)),
                     Ok(Ok(found)) if found.replays < *wanted => {

@@ -263,10 +263,13 @@ impl External {
             if matches!(&outcome, Outcome::Answer(answer) if answer.is_extreme()) {
                 self.program.cut_off();
             }
-            // That no process may be started is no answer.
-            if !matches!(&outcome, Outcome::Failed(found) if found.kind() == FailureKind::Absent) {
-                self.program.learn(key, outcome.clone());
+            match &outcome {
+                // That no process may be started is no answer.
+                Outcome::Failed(found) if found.kind() == FailureKind::Absent => return outcome,
+                Outcome::Failed(failure) => self.program.fail(failure),
+                _ => {}
             }
+            self.program.learn(key, outcome.clone());
             outcome
         });
         if let Outcome::Failed(failure) = &outcome {

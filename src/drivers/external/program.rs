@@ -35,6 +35,8 @@ pub struct Program {
     maps: Mutex<Vec<Arc<MapLine>>>,
     missed: AtomicU64,
     cut_off: AtomicU64,
+    /// Failures, and the last of them.
+    failed: Mutex<(u64, Option<Arc<Failure>>)>,
     unreached: Mutex<Unreached>,
     thoughts: Mutex<Thoughts>,
     /// How its answers differed when it was asked the same again, if they ever did.
@@ -96,6 +98,7 @@ impl Program {
             maps: Mutex::default(),
             missed: AtomicU64::new(0),
             cut_off: AtomicU64::new(0),
+            failed: Mutex::default(),
             unreached: Mutex::default(),
             thoughts: Mutex::default(),
             otherwise: OnceLock::new(),
@@ -155,6 +158,17 @@ impl Program {
     /// Answers that asked for more than any vehicle can do, since avastra was started.
     pub fn extreme_answers(&self) -> u64 {
         self.cut_off.load(Ordering::Relaxed)
+    }
+
+    /// Notes that it failed.
+    pub(super) fn fail(&self, failure: &Arc<Failure>) {
+        let mut failed = locked(&self.failed);
+        *failed = (failed.0 + 1, Some(Arc::clone(failure)));
+    }
+
+    /// How often it failed since avastra was started, and the last failure.
+    pub fn failed(&self) -> (u64, Option<Arc<Failure>>) {
+        locked(&self.failed).clone()
     }
 
     /// If it was given up, the last of the failures in a row to start it or to connect to it.

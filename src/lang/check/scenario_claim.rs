@@ -46,6 +46,7 @@ impl Reader<'_> {
             ast::ExprKind::Binary { op: BinaryOp::Compare(Comparison::Equal), left, right, .. } => {
                 match (&left.kind, &right.kind) {
                     (ast::ExprKind::Name(name), ast::ExprKind::List(items)) if name == "proc" => {
+                        self.no_clause(&expect.clauses)?;
                         let values = items.iter().map(|item| self.take(figure(item, Dimension::RATIO)));
                         values.collect::<Option<_>>().map(Claim::Proc)
                     }
@@ -71,6 +72,7 @@ impl Reader<'_> {
                     (ast::ExprKind::Name(name), ast::ExprKind::Text(text))
                         if name == ScenarioClaim::Trace.name() =>
                     {
+                        self.no_clause(&expect.clauses)?;
                         if !is_digest(text) {
                             let error =
                                 Diagnostic::error(code::UNKNOWN_CLAIM, "this is the digest of no trace");
@@ -93,6 +95,7 @@ impl Reader<'_> {
                     (ast::ExprKind::Name(name), ast::ExprKind::Name(end))
                         if name == ScenarioClaim::End.name() =>
                     {
+                        self.no_clause(&expect.clauses)?;
                         if !ENDS.contains(&end.as_str()) {
                             let message = format!("an episode does not end `{end}`");
                             let error = Diagnostic::error(code::UNKNOWN_CLAIM, message);
@@ -235,14 +238,25 @@ impl Reader<'_> {
         Some(Claim::Avoidability { class, by: drivers, obstacle })
     }
 
-    /// `with npc#2` and, if the claim has a time, `at 14.22 s`.
+    /// A claim about the whole episode has neither a road user nor a time.
+    fn no_clause(&mut self, clauses: &[ast::Clause]) -> Option<()> {
+        let Some(clause) = clauses.first() else { return Some(()) };
+        let error = Diagnostic::error(code::UNKNOWN_CLAIM, "unknown clause of this claim");
+        self.reject(error.at(clause.span, "").help("it is about the whole episode: leave this out"))
+    }
+
+    /// `with npc#2` and, if the claim has a time, `at 14.22 s`, each once at most.
     fn clauses(
         &mut self,
         clauses: &[ast::Clause],
         timed: bool,
     ) -> Option<(Option<Obstacle>, Option<Figure>)> {
         let (mut obstacle, mut time) = (None, None);
-        for clause in clauses {
+        for (index, clause) in clauses.iter().enumerate() {
+            if clauses[..index].iter().any(|other| other.kind == clause.kind) {
+                let error = Diagnostic::error(code::UNKNOWN_CLAIM, "this stands twice in the claim");
+                return self.reject(error.at(clause.span, "").help("leave one of the two out"));
+            }
             match (clause.kind, &clause.value.kind) {
                 (ClauseKind::With, ast::ExprKind::Numbered { name, number })
                     if number.parse::<u32>().is_ok_and(|number| number > 0) =>
@@ -265,7 +279,10 @@ impl Reader<'_> {
                 }
                 _ => {
                     let error = Diagnostic::error(code::UNKNOWN_CLAIM, "unknown clause of this claim");
-                    let help = "write `collision with npc#2 at 14.22 s`; obstacles are numbered from 1";
+                    let help = match clause.kind {
+                        ClauseKind::At => "this claim has no time: leave it out",
+                        _ => "write `collision with npc#2 at 14.22 s`; obstacles are numbered from 1",
+                    };
                     return self.reject(error.at(clause.span, "").help(help));
                 }
             }
