@@ -36,18 +36,19 @@ pub fn moments(output: &Output, arguments: &DiagnoseArguments, asked: &Asked) ->
         Ok(Moments {
             file: file.clone(),
             scenario: scenario.name.clone(),
+            name: in_words(table.space(), &log, found),
             noun: found.noun(),
             risen,
             written,
         })
     })?;
-    for Moments { file, noun, risen, written, .. } in &found.done {
+    for Moments { file, name, noun, risen, written, .. } in &found.done {
         let written = match written {
             _ if !arguments.write => String::new(),
             0 => "; nothing written, because the driving system failed in most branches".to_owned(),
             _ => format!("; {} written", plural(*written, "moment")),
         };
-        output.say(&format!("{}: {}{written}", file.shown(), moment_text(noun, risen)));
+        output.say(&format!("{}: {}{written}", file.shown(), moment_text(name, noun, risen)));
         if found.is_single() {
             let line =
                 |at: &Branched| format!("  {:>6.1} s  {:<12} {}", at.time_s, bar(at.share()), at.again);
@@ -71,6 +72,8 @@ pub fn moments(output: &Output, arguments: &DiagnoseArguments, asked: &Asked) ->
 struct Moments {
     file: PathBuf,
     scenario: String,
+    /// `crash with npc#1`.
+    name: String,
     noun: &'static str,
     risen: NoReturn,
     /// How many were written into the file.
@@ -117,14 +120,27 @@ fn write(
     let claims: Vec<String> = told.map(claim).collect();
     if !claims.is_empty() {
         let text = read(file).map_err(|error| Failure::file("read", file, error))?;
-        let text = with_moments(&text, &whom, &claims).expect("it claims something");
+        let text = with_moments(&text, &whom, &claims)
+            .ok_or_else(|| Failure::file("change", file, "it was changed meanwhile"))?;
         write_again(file, &text)?;
     }
     Ok(claims.len())
 }
 
+/// A finding with the road user or the requirement.
+fn in_words(space: &Space, log: &EpisodeLog, found: Found) -> String {
+    match found {
+        Found::Collision(index) => {
+            format!("{} with npc#{}", found.noun(), log.collisions[index].contact.obstacle)
+        }
+        Found::Breach(index) => {
+            format!("{} of `{}`", found.noun(), space.requirements[log.breaches[index].requirement].name)
+        }
+    }
+}
+
 /// When a finding became certain, in words.
-fn moment_text(noun: &str, risen: &NoReturn) -> String {
+fn moment_text(name: &str, noun: &str, risen: &NoReturn) -> String {
     let percent = |at: &Branched| format!("{:.0} %", 100.0 * at.share());
     let NoReturn { found_s, moments, rises_s, avoidable_until_s } = risen;
     let rise = match (rises_s, risen.ends()) {
@@ -158,7 +174,7 @@ fn moment_text(noun: &str, risen: &NoReturn) -> String {
         0 => String::new(),
         _ => format!("; the driving system failed in {failed} other branches, which say nothing"),
     };
-    format!("{noun} at {found_s:.2} s; {rise}{avoidable}{failed}")
+    format!("{name} at {found_s:.2} s; {rise}{avoidable}{failed}")
 }
 
 /// A share as a bar of ten signs.
