@@ -35,9 +35,9 @@ pub fn rewritten(text: &str, anew: &str, is_refuted: &[bool], fields: &[&str]) -
     edited(text, edits)
 }
 
-/// A scenario's file with the claims `anew` about the recurrence of a collision or a breach from moments on, in place of those that
-/// it has; `whom` is the number of the road user, or the requirement. A claim about a collision that names nobody is one about it.
-/// `None` if the file claims nothing.
+/// A scenario's file with the claims `anew` about the recurrence of a finding from moments on. They replace the claims of this kind
+/// that it has. `whom` is the number of the road user, or the requirement. A claim without `with` is about the finding, too. `None`
+/// if the file claims nothing.
 pub fn with_moments(text: &str, whom: &str, anew: &[String]) -> Option<String> {
     let file = parsed(text);
     let (scenario, _) = scenario_of(&file)?;
@@ -80,21 +80,16 @@ fn edited(text: &str, mut edits: Vec<(Range<usize>, String)>) -> String {
 fn claim_edits(
     (text, old): (&str, &[Expect]),
     (anew, new): (&str, &[Expect]),
-    is_refuted_by: &[bool],
+    is_refuted: &[bool],
 ) -> Vec<(Range<usize>, String)> {
     let claimed: Vec<About> = old.iter().map(about).collect();
     let mut left: Vec<(About, &Expect)> = new.iter().map(|expect| (about(expect), expect)).collect();
     // The moments of a finding hold together: a curve without its middle would mislead.
-    let is_refuted: Vec<bool> = claimed
-        .iter()
-        .zip(is_refuted_by)
-        .map(|(about, is_refuted)| {
-            let of_same =
-                claimed.iter().zip(is_refuted_by).any(|(other, refuted)| *refuted && other == about);
-            *is_refuted || about.0 == FROM_A_MOMENT && of_same
-        })
-        .collect();
-    let refuted = old.iter().zip(&claimed).zip(&is_refuted).filter(|(_, is_refuted)| **is_refuted);
+    let is_of_refuted = |about: &About| {
+        about.0 == FROM_A_MOMENT && claimed.iter().zip(is_refuted).any(|(other, is)| *is && other == about)
+    };
+    let goes = |((_, about), is_refuted): &((&Expect, &About), &bool)| **is_refuted || is_of_refuted(about);
+    let refuted = old.iter().zip(&claimed).zip(is_refuted).filter(goes);
     let edit = |((expect, known), _): ((&Expect, &About), &bool)| {
         let is_new = |found: &About| found.0 == known.0 && !claimed.contains(found);
         let same = left.iter().position(|(found, _)| found == known);
@@ -280,7 +275,7 @@ scenario s {
         let commented = OLD.replace("  expect minimal with npc#1\n", "");
         let found = claims(&commented.replace('\n', "\r\n"), "1", &[one]).unwrap();
         assert!(found.contains(&format!("// by hand\r\n  expect {one}\r\n  expect proc")), "{found}");
-        // A claim that names nobody is about the collision, too.
+        // A claim without `with` is about the collision, too.
         let unnamed = OLD.replace(" with npc#1", "").replace("minimal", "recurrence == 2 / 4 at 5 s");
         let found = claims(&unnamed, "1", &[one]).unwrap();
         assert!(found.contains(&format!("proc == [0.1]\n  expect {one}\n}}")), "{found}");

@@ -158,7 +158,7 @@ fn failed_on((found, failed_replays): (&Totals, u64), fail_on: &[FailOn]) -> Res
     if found.failed > 0 && (!fail_on.is_empty() || found.failed == found.episodes) {
         return Err(Failure::Ads { findings: found.failed as usize });
     }
-    // What could not be played again may recur.
+    // A finding whose replays failed may recur.
     if failed_replays > 0 && asks(FailOn::Recurring) {
         return Err(Failure::Replays { failed: failed_replays as usize });
     }

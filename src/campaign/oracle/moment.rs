@@ -109,6 +109,7 @@ pub fn no_return(setup: &Setup, log: &EpisodeLog, found: Found, most: u32) -> No
         (0..=coarse).map(|number| fine(first_s + f64::from(number) * COARSE_S)).chain([last_s]).collect();
     // The chance may fall and rise again. The last rise leads to the finding.
     let last_unlikely = coarse.iter().rposition(|time_s| !looked.at(*time_s, CLOSER * most).is_likely());
+    // Those before it are only shown.
     for time_s in &coarse {
         looked.at(*time_s, most);
     }

@@ -48,12 +48,12 @@ export function frame(view, recording, timeS, event) {
  */
 export function drawStrip(place, recording, road, seek, peek) {
   const event = recording.event();
-  const times = stillTimes(recording, event);
+  const [times, rise] = [stillTimes(recording, event), recording.rise()];
   const views = [];
   const stills = times.map((timeS, i) => {
     const canvas = el("canvas", { "aria-hidden": "true" });
     const isLast = i === times.length - 1 && event;
-    const share = timeS === recording.rise()?.at_s ? ` · from here in ${inHundred(recording.rise())}` : "";
+    const share = timeS === rise?.at_s ? ` · from here in ${inHundred(rise)}` : "";
     const caption = `${atTime(timeS)}${isLast ? ` · ${event.what}` : share}`;
     const view = new View(canvas, recording, road, STILL_LAYERS);
     views.push([view, timeS]);
