@@ -94,6 +94,12 @@ pub trait Cut: Campaign {
         as_they_are(database)
     }
 
+    /// Of the items that are not played, rising, those that are to be played next: all, unless what was found decides how many
+    /// there are.
+    fn next(&self, lacking: Vec<usize>, _: &Self::Database) -> Result<Vec<usize>, DatabaseError> {
+        Ok(lacking)
+    }
+
     /// Takes over what a shard keeps beside its database.
     fn take_beside(_: [&Path; 2]) -> Result<(), Failure> {
         Ok(())
@@ -138,11 +144,15 @@ impl Share {
         Ok(Share { shard, own: shard.share(&costs(&work)), work })
     }
 
-    /// Those of its items that are not played.
+    /// Those of its items that are to be played next.
     pub fn lacking<C: Cut>(&self, settings: &C, directory: &Directory<C>) -> Result<Vec<usize>, Failure> {
-        let played = directory.read(|database| settings.numbered(database))?;
-        let played = played.into_iter().map(|(_, place)| place).collect();
-        Ok(self.own.iter().copied().filter(|&item| !self.work[item].is_in(&played)).collect())
+        directory.read(|database| self.next(settings, database))
+    }
+
+    fn next<C: Cut>(&self, settings: &C, database: &C::Database) -> Result<Vec<usize>, DatabaseError> {
+        let played = settings.numbered(database)?.into_iter().map(|(_, place)| place).collect();
+        let lacking = self.own.iter().copied().filter(|&item| !self.work[item].is_in(&played));
+        settings.next(lacking.collect(), database)
     }
 
     /// The progress over its episodes. `how` is as for [`Progress`], `lacking` has the items that are not played.
@@ -177,14 +187,16 @@ pub fn missing<C: Cut>(
     database: &C::Database,
     is_wanted: impl Fn(i64) -> bool,
 ) -> Result<Option<String>, Failure> {
-    let Share { own, work, .. } = Share::of(directory, settings)?;
-    let played = settings.numbered(database);
-    let played = played.map_err(|error| Failure::file("read", &C::KIND.database(directory), error))?;
+    let share = Share::of(directory, settings)?;
+    let unread = |error| Failure::file("read", &C::KIND.database(directory), error);
+    let played = settings.numbered(database).map_err(unread)?;
     let played: BTreeSet<i64> = played.into_iter().map(|(_, place)| place).collect();
-    let wanted = own.iter().flat_map(|&item| work[item].units.clone()).filter(|&unit| is_wanted(unit));
-    let wanted: Vec<i64> = wanted.collect();
-    let lacking = wanted.iter().filter(|unit| !played.contains(*unit)).count();
-    Ok(lacks::<C>(directory, lacking, wanted.len()))
+    let lacking = share.next(settings, database).map_err(unread)?;
+    let lacking = lacking.iter().flat_map(|&item| share.work[item].units.clone());
+    let lacking: BTreeSet<i64> = lacking.filter(|unit| is_wanted(*unit) && !played.contains(unit)).collect();
+    let there = share.own.iter().flat_map(|&item| share.work[item].units.clone());
+    let there = there.filter(|unit| is_wanted(*unit) && played.contains(unit)).count();
+    Ok(lacks::<C>(directory, lacking.len(), there + lacking.len()))
 }
 
 /// Says that units are missing, and how to go on; nothing if none is.

@@ -21,19 +21,47 @@ pub struct Progress {
     found: usize,
     /// The word after the number of collisions, which says what kind is told: `counted`, for example.
     how: &'static str,
+    /// Simulated time so far, s, if its minutes are counted in place of episodes.
+    simulated_s: Option<f64>,
 }
 
 impl Progress {
     /// `resumed` episodes count as done already.
     pub fn new(output: &Output, how: &'static str, total: u64, resumed: u64) -> Progress {
-        Progress { count: Count::new(output, "episodes", total, resumed), found: 0, how }
+        let count = Count::new(output, "episodes", total, resumed);
+        Progress { count, found: 0, how, simulated_s: None }
+    }
+
+    /// The progress of so many hours of simulated time, of which `simulated_s` are done already.
+    pub fn of_hours(output: &Output, how: &'static str, hours: f64, simulated_s: f64) -> Progress {
+        let total = (60.0 * hours).ceil() as u64;
+        let count = Count::new(output, "simulated minutes", total, minutes(simulated_s).min(total));
+        Progress { count, found: 0, how, simulated_s: Some(simulated_s) }
     }
 
     /// One more episode is done, with so many of the collisions that are told.
     pub fn episode(&mut self, found: usize) {
-        self.found += found;
-        self.count.up(format!("{} {}", plural(self.found, "collision"), self.how));
+        self.episode_of(found, 0.0);
     }
+
+    /// As [`Progress::episode`]; the episode took so long in the simulation.
+    pub fn episode_of(&mut self, found: usize, duration_s: f64) {
+        self.found += found;
+        let more = match &mut self.simulated_s {
+            None => 1,
+            Some(so_far_s) => {
+                let before = minutes(*so_far_s);
+                *so_far_s += duration_s;
+                minutes(*so_far_s) - before
+            }
+        };
+        self.count.up(more, format!("{} {}", plural(self.found, "collision"), self.how));
+    }
+}
+
+/// Whole minutes of a time.
+fn minutes(time_s: f64) -> u64 {
+    (time_s / 60.0) as u64
 }
 
 /// Episodes over which a training's progress is averaged.
@@ -64,7 +92,7 @@ impl TrainingProgress {
         let mean = self.recent.iter().sum::<f64>() / self.recent.len() as f64;
         let loss = trained.lesson.loss.map_or("no loss yet".to_owned(), |loss| format!("loss {loss:.3}"));
         let (found, epsilon) = (self.found, trained.exploration_epsilon);
-        self.count.up(format!("{found} counted, return {mean:.1}, ε {epsilon:.2}, {loss}"));
+        self.count.up(1, format!("{found} counted, return {mean:.1}, ε {epsilon:.2}, {loss}"));
     }
 }
 
@@ -79,7 +107,7 @@ impl Pieces {
 
     /// One more piece is done.
     pub fn one(&self) {
-        self.0.lock().expect("no thread panics while counting").up(String::new());
+        self.0.lock().expect("no thread panics while counting").up(1, String::new());
     }
 
     /// Prints something while the bar is out of the way.
@@ -137,13 +165,15 @@ impl Count {
         Count { bar, lines: telling == Telling::Lines, noun, begun: now(), total, done }
     }
 
-    fn up(&mut self, message: String) {
-        self.done += 1;
+    /// So many more are done. The last episode of a run by time ends after it.
+    fn up(&mut self, more: u64, message: String) {
+        let before = self.done;
+        self.done = (self.done + more).min(self.total);
         if let Some(bar) = &self.bar {
             bar.set_message(message);
-            bar.inc(1);
+            bar.set_position(self.done);
         } else if self.lines
-            && self.done * 10 / self.total > (self.done - 1) * 10 / self.total
+            && self.done * 10 / self.total > before * 10 / self.total
             && self.begun.elapsed() >= SILENT
         {
             let message = if message.is_empty() { message } else { format!(", {message}") };

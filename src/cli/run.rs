@@ -11,7 +11,7 @@ use avastra_campaign::episode::EpisodeLog;
 use avastra_campaign::oracle;
 use avastra_campaign::oracle::mixed_text;
 use avastra_campaign::run::{
-    Conditions, DEFAULT_ADS, Database, DatabaseError, EpisodeSummary, FoundIn, Group, Numbered,
+    Budget, Conditions, DEFAULT_ADS, Database, DatabaseError, EpisodeSummary, FoundIn, Group, Numbered,
     PolicyReference, RefusalCount, RequirementCount, Run, RunSettings, Totals, TrafficRecord, play,
 };
 use avastra_drivers::ModularConfig;
@@ -33,6 +33,7 @@ use super::never::Never;
 use super::output::{Output, for_shell, plural};
 use super::parallel::jobs;
 use super::policy::acting;
+use super::progress::Progress;
 use super::run_directory::{Player, Resumed};
 use super::{compile, conditions, load, merge, protocol, run_directory, shard};
 
@@ -78,6 +79,17 @@ impl Cut for RunSettings {
     fn work(&self) -> Vec<Item> {
         let episodes = self.all_episodes() as i64;
         (0..episodes).map(|number| Item { cost: 1, units: number..number + 1 }).collect()
+    }
+
+    /// With a budget, those of the block under way, or of the next one.
+    fn next(&self, mut lacking: Vec<usize>, database: &Database) -> Result<Vec<usize>, DatabaseError> {
+        let (Some(budget), Some(&first)) = (&self.budget, lacking.first()) else { return Ok(lacking) };
+        let block = self.block();
+        if first.is_multiple_of(block) && first > 0 && database.is_spent(self, budget)? {
+            return Ok(Vec::new());
+        }
+        lacking.retain(|number| number / block == first / block);
+        Ok(lacking)
     }
 
     fn numbered(&self, database: &Database) -> Result<Vec<Numbered>, DatabaseError> {
@@ -185,7 +197,7 @@ fn play_all(
     let program = run.arena().program();
     let share = Share::of(&directory.path, run.settings())?;
     // Items are episodes, by their numbers.
-    let todo = share.lacking(run.settings(), &directory)?;
+    let mut todo = share.lacking(run.settings(), &directory)?;
     if !todo.is_empty() {
         directory.refuse_to_play(program.is_none_or(|program| program.can_start()))?;
     }
@@ -193,25 +205,36 @@ fn play_all(
     let stop = stop_on_interrupt();
     let started = now();
     let jobs = jobs(asked_jobs, program)?;
-    let mut progress = share.progress(output, "counted", &todo);
+    let mut progress = match &run.settings().budget {
+        None => share.progress(output, "counted", &todo),
+        Some(budget) => {
+            let simulated_s = 3600.0 * directory.read(|database| database.left(run.settings()))?.simulated_h;
+            Progress::of_hours(output, "counted", budget.hours, simulated_s)
+        }
+    };
+    let mut played = 0;
     let mut driven: Vec<(usize, Arc<Conversation>)> = Vec::new();
     let mut failed_episodes = 0;
-    play(&run, &todo, jobs, &stop, &mut |summary, log| {
-        // An episode that was not driven is not kept, so that `--resume` plays it.
-        if log.failure.as_ref().is_some_and(|failure| failure.problem == Problem::GivenUp) {
-            stop.store(true, Ordering::Relaxed);
-            return Ok(());
-        }
-        failed_episodes += u64::from(log.failure.is_some());
-        keep(&run, &mut directory, &summary, &log)?;
-        progress.episode(summary.counted());
-        if driven.len() < SPOT_CHECKS && log.failure.is_none() {
-            driven.extend(log.conversation.clone().map(|conversation| (summary.episode, conversation)));
-        }
-        Ok::<_, Failure>(())
-    })?;
+    while !todo.is_empty() && !stop.load(Ordering::Relaxed) {
+        play(&run, &todo, jobs, &stop, &mut |summary, log| {
+            // An episode that was not driven is not kept, so that `--resume` plays it.
+            if log.failure.as_ref().is_some_and(|failure| failure.problem == Problem::GivenUp) {
+                stop.store(true, Ordering::Relaxed);
+                return Ok(());
+            }
+            failed_episodes += u64::from(log.failure.is_some());
+            keep(&run, &mut directory, &summary, &log)?;
+            played += 1;
+            progress.episode_of(summary.counted(), log.duration_s);
+            if driven.len() < SPOT_CHECKS && log.failure.is_none() {
+                driven.extend(log.conversation.clone().map(|conversation| (summary.episode, conversation)));
+            }
+            Ok::<_, Failure>(())
+        })?;
+        todo = share.lacking(run.settings(), &directory)?;
+    }
     drop(progress);
-    let is_over = share.lacking(run.settings(), &directory)?.is_empty();
+    let is_over = todo.is_empty();
     if is_over {
         directory = settled(run.settings(), directory)?;
     }
@@ -227,7 +250,7 @@ fn play_all(
     let refusals = directory.read(Database::refusals)?;
     let is_mixed = program.is_some_and(|program| !program.is_deterministic());
     let not_arrived = directory.read(Database::not_arrived)?;
-    output.say(&totals_text(&totals, &not_arrived, started.elapsed().as_secs_f64(), todo.len(), is_mixed));
+    output.say(&totals_text(&totals, &not_arrived, started.elapsed().as_secs_f64(), played, is_mixed));
     if totals.replayed > 0 && !oracle::can_tell(run.settings().replays) {
         output.say("fewer than 7 replays never show that a finding recurs: `--repeat 20`");
     }
@@ -262,6 +285,8 @@ fn play_all(
     if !requirements.is_empty() {
         output.say(&requirements_text(&requirements));
     }
+    let left = directory.read(|database| database.left(run.settings()))?;
+    left.in_words().iter().for_each(|text| output.say(text));
     let is_protocol = run.settings().rows > 0;
     let tests = match is_protocol {
         true => directory.read(|database| database.tests(Some(run.space())))?,
@@ -310,7 +335,7 @@ fn play_all(
     cut_off(program).iter().for_each(|note| output.warn(note));
     output.result(serde_json::json!({
         "directory": directory.path, "trained_elsewhere": elsewhere, "totals": totals, "refusals": refusals, "groups": groups,
-        "requirements": requirements, "never": never, "critical": critical, "found": found, "kept": kept, "failures": failures, "thinking": program.and_then(|program| program.thinking()), "tests": tests, "tables": tables, "reproducible": is_reproducible,
+        "requirements": requirements, "left": left, "never": never, "critical": critical, "found": found, "kept": kept, "failures": failures, "thinking": program.and_then(|program| program.thinking()), "tests": tests, "tables": tables, "reproducible": is_reproducible,
         "failed_replays": failed_replays.as_ref().map_or(0, |(times, _)| *times),
     }));
     share.end(output, directory, is_over, program)?;
@@ -340,6 +365,15 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<Begun>, Fai
         replays: arguments.replays,
         keep: arguments.keep,
         ..settings
+    };
+    let settings = match arguments.hours {
+        None => settings,
+        Some(hours) if shard.is_whole() => settings.within(Budget { hours, until: arguments.until }),
+        Some(_) => {
+            return Err(Failure::usage(
+                "a run with `--hours` is one piece: give each machine a `--seed` of its own, or `--episodes` and shards",
+            ));
+        }
     };
     let settings = settings.started_unless(arguments.shard.dry_run);
     let run = ready(table, settings, policy.as_ref(), face)?;
@@ -533,7 +567,11 @@ fn heading(run: &Run) -> String {
         settings.agent,
         ads,
         profile_text(profile.as_ref()),
-        plural(if settings.rows > 0 { run.episodes() } else { settings.episodes as usize }, "episode"),
+        match settings.budget {
+            Some(Budget { hours, .. }) => format!("{hours} h of simulated time"),
+            None if settings.rows > 0 => plural(run.episodes(), "episode"),
+            None => plural(settings.episodes as usize, "episode"),
+        },
         roads.join(", "),
         settings.seed
     )

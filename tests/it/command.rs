@@ -293,6 +293,54 @@ fn an_interrupted_run_goes_on_where_it_was() {
     assert_eq!(traces("whole"), traces("cut"));
 }
 
+/// A run by time stops after whole rounds: threads and interruptions change no byte, and it has as many episodes on each road.
+#[test]
+fn a_run_by_time_is_the_same_with_any_threads_and_kills() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let space = root().join("scenarios/avastra45.ava").display().to_string();
+    let run = |out: &str, more: &[&str]| {
+        let all = ["run", &space, "--ads", "reactive", "--seed", "3", "--out", out, "--format", "json"];
+        last_line(&done_in(scratch.path(), &[&all, more].concat()))
+    };
+    let whole = run("whole", &["--hours", "0.3", "--jobs", "2"]);
+    let (episodes, simulated_h) = (&whole["totals"]["episodes"], whole["left"]["simulated_h"].as_f64());
+    assert!(simulated_h.is_some_and(|hours| (0.3..0.7).contains(&hours)), "{}", whole["left"]);
+    assert!(episodes.as_u64().is_some_and(|count| count > 16 && count.is_multiple_of(16)), "{episodes}");
+    let left = &whole["left"]["next_hour"];
+    assert!(
+        left["low"].as_f64() <= left["chance"].as_f64() && left["chance"].as_f64() < left["high"].as_f64()
+    );
+
+    run("cut", &["--hours", "0.3", "--jobs", "1"]);
+    let file = scratch.path().join("cut/run.db");
+    let bytes = |run: &str| std::fs::read(scratch.path().join(run).join("run.db")).expect("a database");
+    assert_eq!(bytes("whole"), bytes("cut"));
+    let tables = ["step", "collision", "breach", "margin", "scenario", "offer", "held", "episode"];
+    let cut = tables.map(|table| format!("DELETE FROM {table} WHERE episode >= 21;")).concat();
+    change(&file, &(cut + "DELETE FROM seal WHERE unit >= 21;"));
+    done_in(scratch.path(), &["run", "--resume", "cut"]);
+    assert_eq!(bytes("whole"), bytes("cut"));
+
+    // It stops sooner if nothing new is likely, and at its first look at the soonest.
+    let sooner = run("sooner", &["--hours", "3", "--until", "0.99"]);
+    let (hours, high) =
+        (sooner["left"]["simulated_h"].as_f64(), sooner["left"]["next_hour"]["high"].as_f64());
+    assert!(hours < Some(3.0) && high <= Some(0.99), "{}", sooner["left"]);
+    // Without replays nothing recurs, so nothing is said of the next hour.
+    let untold = run("untold", &["--episodes", "2", "--repeat", "0"]);
+    assert!(untold["left"]["next_hour"].is_null(), "{}", untold["left"]);
+
+    for (wrong, why) in [
+        (&["--hours", "0"][..], "the budget is 0 h"),
+        (&["--hours", "NaN"], "the budget is NaN h"),
+        (&["--hours", "1", "--until", "1"], "the budget is 1 h, until 1"),
+        (&["--hours", "1", "--agent", "every-row"], "`--hours` is for other agents"),
+        (&["--hours", "1", "--shard", "1/2"], "a run with `--hours` is one piece"),
+    ] {
+        fails(&[&["run", &space, "--out", "wrong"], wrong].concat(), why);
+    }
+}
+
 /// A run ends with the rows that never happened, and with what stood in their way.
 #[test]
 fn a_run_says_what_never_happened() {

@@ -1,7 +1,7 @@
 //! Statistics of samples: intervals, rank tests, survival. Pure functions that know no driving.
 //!
 //! Written here and not taken from a crate because results must be the same bytes on every machine:
-//! those at hand use the platform's logarithm and exponential function. All intervals are 95 %.
+//! those at hand use the platform's logarithm and exponential function. All intervals are 95 %, if not said otherwise.
 //!
 //! ```
 //! use avastra_base::statistics::{mann_whitney, superiority};
@@ -18,7 +18,7 @@ mod survival;
 
 pub use intervals::{
     Estimate, Interval, binomial, binomial_missing, mean, paired_difference, poisson, proportion,
-    ratio_of_means, sequential, sequential_excludes, variance_of_mean, weighted, wilson,
+    ratio_of_means, sequential, sequential_excludes, unseen, variance_of_mean, weighted, wilson,
 };
 pub use ranks::{PairedTest, RankTest, holm, mann_whitney, sign_test, signed_ranks, superiority};
 pub use survival::{Lifetime, restricted_mean};

@@ -20,7 +20,7 @@ use avastra_world::sim::World;
 use crate::run::arena::{Arena, Offers, choose};
 use crate::run::gauges::Gauges;
 use crate::run::offered::Offered;
-use crate::run::settings::{RunError, RunSettings, agent_named, check_episodes};
+use crate::run::settings::{Budget, RunError, RunSettings, agent_named, check_episodes};
 use crate::run::summary::EpisodeSummary;
 use crate::run::threads::on_threads;
 
@@ -45,6 +45,9 @@ impl Run {
     pub fn new(table: ActionTable, settings: RunSettings) -> Result<Run, RunError> {
         match agent_named(&settings.agent)?.kind {
             Kind::Ready(build) => Run::with_agent(table, settings, Box::new(move |_| build())),
+            Kind::OneRow(_) if settings.budget.is_some() => {
+                Err(RunError::BudgetOfRows { name: settings.agent })
+            }
             Kind::OneRow(build) => {
                 let before: Vec<Vec<usize>> = {
                     let space = table.space();
@@ -70,6 +73,7 @@ impl Run {
 
     fn with_agent(table: ActionTable, settings: RunSettings, agent: Box<MakeAgent>) -> Result<Run, RunError> {
         check_episodes(settings.episodes)?;
+        settings.budget.as_ref().map_or(Ok(()), Budget::check)?;
         if settings.avoidability != AvoidabilitySettings::default() {
             return Err(RunError::Avoidability);
         }
@@ -102,7 +106,7 @@ impl Run {
         self.settings.all_episodes()
     }
 
-    /// Plays one episode; numbers run through the roads one after another.
+    /// Plays one episode; numbers run through the roads one after another, with a budget round and round.
     pub fn episode(&self, number: usize) -> EpisodeLog {
         played_by(&self.setup(number), self.agent_of(number).as_mut())
     }
@@ -161,8 +165,8 @@ impl Run {
     /// Everything that the nth episode is made of but the choices.
     pub fn setup(&self, number: usize) -> episode::Setup {
         let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
-        let block = number / self.settings.episodes as usize;
-        self.setup_of(self.planned(number).map_or(block, |(road, _)| road), seed)
+        let (_, turn) = self.settings.turn(number);
+        self.setup_of(self.planned(number).map_or(turn, |(road, _)| road), seed)
     }
 
     /// A fresh agent for the nth episode.
@@ -185,8 +189,8 @@ impl Run {
     /// How many vehicles of ambient traffic are there at the beginning of an episode on each road, by its name.
     pub fn ambient_at_start(&self) -> Vec<(String, u32)> {
         let found = (0..self.settings.conditions.roads.len()).map(|road| {
-            let first = road * self.settings.episodes as usize;
-            let seed = rng::child_seed(self.settings.seed, Stream::Episode, first as u64);
+            let first = self.settings.first_on(road) as u64;
+            let seed = rng::child_seed(self.settings.seed, Stream::Episode, first);
             let setup = self.setup_of(road, seed);
             let world = World::new(Arc::clone(&setup.scene), &setup.start);
             let ambient = world.obstacles().filter(|obstacle| obstacle.is_ambient()).count();

@@ -88,8 +88,12 @@ pub struct RunSettings {
     /// The policy that the agent follows, from the run directory, and its digest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub policy: Option<PolicyReference>,
-    /// Episodes on each road; of an agent that plays each row, those of each row on a road.
+    /// Episodes on each road; of an agent that plays each row, those of each row on a road. With a budget, the most that there
+    /// can be.
     pub episodes: u32,
+    /// Ends the run by time in place of a number of episodes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub budget: Option<Budget>,
     /// How many rows on roads such an agent plays; 0 of others.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub rows: u32,
@@ -109,6 +113,43 @@ pub struct RunSettings {
     pub avoidability: AvoidabilitySettings,
 }
 
+/// When a run ends that has no number of episodes. Its episodes go round the roads, and it looks after every few rounds.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Budget {
+    /// Simulated time, h.
+    pub hours: f64,
+    /// Ends it sooner: once an hour more shows a new kind with at most this chance, by the upper end of its interval.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub until: Option<f64>,
+}
+
+impl Budget {
+    /// Longest budget, h.
+    pub const HOURS_MAX: f64 = 1000.0;
+
+    /// Whether it is possible.
+    pub(super) fn check(&self) -> Result<(), RunError> {
+        let fits = self.hours > 0.0
+            && self.hours <= Budget::HOURS_MAX
+            && self.until.is_none_or(|chance| chance > 0.0 && chance < 1.0);
+        let found = || match self.until {
+            None => format!("{} h", self.hours),
+            Some(chance) => format!("{} h, until {chance}", self.hours),
+        };
+        if fits { Ok(()) } else { Err(RunError::Budget { found: found() }) }
+    }
+
+    /// The most episodes that it can pay for on one of so many roads: hardly any is shorter than this.
+    fn episodes(&self, roads: usize) -> u32 {
+        const SHORT_S: f64 = 4.0;
+        ((self.hours * 3600.0 / SHORT_S / roads as f64).ceil() as u32).max(ROUNDS as u32)
+    }
+}
+
+/// Rounds of the roads between two looks at a budget. Ours: some minutes.
+const ROUNDS: usize = 4;
+
 fn is_zero(count: &u32) -> bool {
     *count == 0
 }
@@ -120,6 +161,31 @@ impl RunSettings {
         times * self.episodes as usize
     }
 
+    /// The round of an episode that is about no row, and the place of its road in it.
+    pub fn turn(&self, number: usize) -> (usize, usize) {
+        match self.budget {
+            None => (number % self.episodes as usize, number / self.episodes as usize),
+            Some(_) => (number / self.conditions.roads.len(), number % self.conditions.roads.len()),
+        }
+    }
+
+    /// The first episode on the nth of the roads.
+    pub fn first_on(&self, road: usize) -> usize {
+        if self.budget.is_some() { road } else { road * self.episodes as usize }
+    }
+
+    /// Episodes between two looks at a budget.
+    pub fn block(&self) -> usize {
+        ROUNDS * self.conditions.roads.len()
+    }
+
+    /// The same settings with a budget in place of a number of episodes.
+    #[must_use]
+    pub fn within(self, budget: Budget) -> RunSettings {
+        let episodes = budget.episodes(self.conditions.roads.len());
+        RunSettings { episodes, budget: Some(budget), ..self }
+    }
+
     /// A run with every option off. The caller changes what it wants otherwise.
     pub fn new(conditions: Conditions, agent: &str, episodes: u32, seed: u64) -> RunSettings {
         RunSettings {
@@ -127,6 +193,7 @@ impl RunSettings {
             agent: agent.to_owned(),
             policy: None,
             episodes,
+            budget: None,
             rows: 0,
             seed,
             causes: false,
@@ -177,6 +244,10 @@ pub enum RunError {
     Time(#[from] avastra_lang::prove::BrokenByTime),
     #[error("`{name}` is asked for twice, or both on and off")]
     Twice { name: String },
+    #[error("the budget is {found}: hours above 0 up to 1000 are possible, and a chance above 0 and below 1")]
+    Budget { found: String },
+    #[error("`{name}` plays each row so many times, whatever time that takes: `--hours` is for other agents")]
+    BudgetOfRows { name: String },
     #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]
     Episodes { found: u32 },
     #[error(

@@ -72,6 +72,12 @@ pub struct RunArguments {
     /// Episodes on each road, of `every-row` of each row on each [default: 100, of `every-row` 1].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(avastra_campaign::run::EPISODES_MAX)))]
     pub episodes: Option<u32>,
+    /// Play for so many simulated hours in place of a number of episodes; they go round the roads.
+    #[arg(long, value_name = "H", conflicts_with_all = ["episodes", "dry_run"])]
+    pub hours: Option<f64>,
+    /// Stop sooner, once an hour more shows a new kind of failure with at most this chance, by the upper end of its interval.
+    #[arg(long, value_name = "CHANCE", requires = "hours")]
+    pub until: Option<f64>,
     /// Say of each counted collision which module of the driving system is at fault; takes some twenty
     /// replays for each.
     #[arg(long)]
@@ -97,7 +103,7 @@ pub struct RunArguments {
     #[command(flatten)]
     pub shard: ShardArguments,
     /// Go on with an interrupted run directory; its own settings hold, and the program that they name is started.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "replays", "keep", "out", "self_contained", "shard", "dry_run", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "policy", "face", "episodes", "hours", "until", "seed", "ambient", "traffic", "causes", "replays", "keep", "out", "self_contained", "shard", "dry_run", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if this was found: `recurring` (a counted collision or a breach that recurs), `collision` (any that
     /// counts), `breach` (any), `stalled` (an episode that stalled without a collision). With it, a failure of a

@@ -1,0 +1,179 @@
+//! What a run has found, kind by kind, and what is left: the chance that an hour more shows a kind that it has not seen.
+//!
+//! A *kind* is a pre-crash type without its road, with the modules at fault if these were looked for, or a requirement. A wreck
+//! of another crash and the type "other" are none. A kind is seen in an episode if a finding of it there recurs.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use avastra_base::statistics::unseen;
+
+use crate::episode::PreCrash;
+use crate::oracle::{Recurrence, can_tell};
+use crate::run::database::{Database, from_columns};
+use crate::run::findings::scenario_name;
+use crate::run::sealed::{DatabaseError, query_all};
+use crate::run::settings::{Budget, RunSettings};
+
+/// What a run has found, kind by kind, and what is left.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Left {
+    pub simulated_h: f64,
+    /// The kinds that recur, in the order in which they were seen first.
+    pub kinds: Vec<SeenKind>,
+    /// The chance that an hour more of the same shows another kind; `None` if nothing can be said, because findings were not played
+    /// again, or because the episodes are not drawn by chance.
+    pub next_hour: Option<NextHour>,
+}
+
+/// A kind that recurs.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct SeenKind {
+    pub kind: String,
+    /// Episodes in which a finding of it recurs.
+    pub episodes: u64,
+    /// Simulated time until the end of the first of them, h, if the roads are driven by turns.
+    pub first_h: f64,
+    /// The scenario of the first.
+    pub scenario: String,
+}
+
+/// The chance that an hour shows a new kind, with a 90 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct NextHour {
+    pub chance: f64,
+    pub low: f64,
+    pub high: f64,
+}
+
+impl NextHour {
+    /// From the numbers of kinds that were seen in one episode, and in two, in so many hours.
+    fn after(hours: f64, once: u64, twice: u64) -> NextHour {
+        // New kinds come as a Poisson process.
+        let chance = |expected: f64| -libm::expm1(-expected / hours);
+        let (guess, interval) = unseen(once, twice);
+        let high = interval.high.map_or(1.0, chance);
+        NextHour { chance: chance(guess), low: chance(interval.low), high }
+    }
+}
+
+impl Left {
+    /// For the terminal: kinds, and the chance of a new one.
+    pub fn in_words(&self) -> Option<String> {
+        let NextHour { chance, high, .. } = self.next_hour?;
+        let hours = self.simulated_h;
+        let kinds = match self.kinds.as_slice() {
+            [] => format!("no kind of failure recurs in {hours:.1} h"),
+            [SeenKind { first_h, .. }] => {
+                format!("1 kind of failure recurs in {hours:.1} h, first seen after {first_h:.1} h")
+            }
+            [.., SeenKind { first_h, .. }] => format!(
+                "{} kinds of failure recur in {hours:.1} h, the newest first seen after {first_h:.1} h",
+                self.kinds.len()
+            ),
+        };
+        Some(format!(
+            "{kinds}\nthe chance that an hour more shows a new kind is at most {high:.2} (best guess {chance:.2})"
+        ))
+    }
+}
+
+impl Database {
+    /// What a run with these settings has found so far, and what is left.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn left(&self, settings: &RunSettings) -> Result<Left, DatabaseError> {
+        let query = "SELECT episode, road, duration_s FROM episode";
+        let mut episodes = query_all(&self.connection, query, |row| {
+            Ok((row.get::<_, i64>(0)?, row.get::<_, String>(1)?, row.get::<_, f64>(2)?))
+        })?;
+        episodes.sort_unstable_by_key(|(episode, ..)| settings.turn(*episode as usize));
+        let found = self.kinds_by_episode()?;
+        let mut kinds: BTreeMap<&str, SeenKind> = BTreeMap::new();
+        let mut simulated_s = 0.0;
+        for (episode, road, duration_s) in &episodes {
+            simulated_s += duration_s;
+            for kind in found.seen.get(episode).into_iter().flatten() {
+                let seen = kinds.entry(kind).or_insert_with(|| SeenKind {
+                    kind: kind.clone(),
+                    episodes: 0,
+                    first_h: simulated_s / 3600.0,
+                    scenario: scenario_name(road, *episode),
+                });
+                seen.episodes += 1;
+            }
+        }
+        let mut kinds: Vec<SeenKind> = kinds.into_values().collect();
+        kinds.sort_by(|one, other| one.first_h.total_cmp(&other.first_h));
+        let seen_in = |episodes: u64| kinds.iter().filter(|kind| kind.episodes == episodes).count() as u64;
+        let simulated_h = simulated_s / 3600.0;
+        let is_known = settings.rows == 0 && can_tell(settings.replays) && !found.is_untried;
+        let next_hour =
+            (is_known && simulated_h > 0.0).then(|| NextHour::after(simulated_h, seen_in(1), seen_in(2)));
+        Ok(Left { simulated_h, kinds, next_hour })
+    }
+
+    /// Whether a run has played for as long as its settings say.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn is_spent(&self, settings: &RunSettings, budget: &Budget) -> Result<bool, DatabaseError> {
+        let left = self.left(settings)?;
+        let is_enough = |until: f64| left.next_hour.is_some_and(|next| next.high <= until);
+        Ok(left.simulated_h >= budget.hours || budget.until.is_some_and(is_enough))
+    }
+
+    /// The kinds of findings that recur, by episode.
+    fn kinds_by_episode(&self) -> Result<Found, DatabaseError> {
+        let query =
+            "SELECT episode, precrash_number, precrash, cause, recurred, replays FROM collision WHERE counted
+             UNION ALL SELECT episode, NULL, requirement, NULL, max(recurred), max(replays) FROM breach
+             GROUP BY episode, requirement";
+        let rows = query_all(&self.connection, query, |row| {
+            let (number, name): (Option<u32>, String) = (row.get(1)?, row.get(2)?);
+            let cause: Option<String> = row.get(3)?;
+            let cause = cause.filter(|modules| !modules.is_empty());
+            let kind = match (number, cause) {
+                (None, _) => name,
+                (Some(number), None) => format!("{number} {name}"),
+                (Some(number), Some(modules)) => {
+                    format!("{number} {name}, {}", modules.replace(' ', " and "))
+                }
+            };
+            let is_kind = number != PreCrash::Other.number() && kind != PreCrash::Wreck.name();
+            let recurrence = from_columns(row.get(4)?, row.get(5)?);
+            Ok((row.get(0)?, is_kind.then_some(kind), recurrence))
+        })?;
+        let mut found = Found::default();
+        for (episode, kind, recurrence) in rows {
+            found.is_untried |= recurrence.is_none();
+            if let Some(kind) = kind.filter(|_| recurrence.is_some_and(Recurrence::recurs)) {
+                found.seen.entry(episode).or_default().insert(kind);
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// What recurs in which episode.
+#[derive(Default)]
+struct Found {
+    seen: BTreeMap<i64, BTreeSet<String>>,
+    /// Whether a finding was never played again.
+    is_untried: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_chance_of_a_new_kind_falls_with_the_hours() {
+        let two_digits =
+            |NextHour { chance, low, high }| [chance, low, high].map(|of: f64| (100.0 * of).round());
+        assert_eq!(two_digits(NextHour::after(1.0, 3, 1)), [95.0, 0.0, 100.0]);
+        assert_eq!(two_digits(NextHour::after(20.0, 3, 1)), [14.0, 0.0, 34.0]);
+        assert_eq!(two_digits(NextHour::after(20.0, 0, 0)), [0.0, 0.0, 14.0]);
+        assert_eq!(two_digits(NextHour::after(300.0, 0, 0)), [0.0, 0.0, 1.0]);
+    }
+}
