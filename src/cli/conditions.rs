@@ -1,7 +1,8 @@
 //! The settings of episodes that a command line asks for: who drives, where, under which conditions.
 
-use avastra_campaign::run::{Conditions, Profile, Run, RunSettings, TrafficRecord};
-use avastra_lang::model::Space;
+use avastra_campaign::run::{self, Conditions, Profile, Run, RunError, RunSettings, TrafficRecord};
+use avastra_lang::model::{Policy, Space};
+use avastra_world::sim::TrafficProfile;
 
 use super::arguments::ConditionArguments;
 use super::error::Failure;
@@ -29,6 +30,40 @@ pub fn settings(
         ..Conditions::of(space)
     };
     Ok(RunSettings::new(conditions, agent, episodes, arguments.seed))
+}
+
+/// The driving system that a policy was trained against.
+pub fn trained_against(policy: &Policy) -> Result<UnderTest, Failure> {
+    let ads = run::trained_against(policy)?;
+    Ok(UnderTest { ads: ads.name().to_owned(), profile: ads.profile().map(Profile::new), external: None })
+}
+
+/// Fills in what a policy was trained under, where the command line names nothing else.
+pub fn as_trained(
+    conditions: &mut Conditions,
+    arguments: &ConditionArguments,
+    policy: &Policy,
+    space: &Space,
+) -> Result<(), Failure> {
+    let origin = &policy.origin;
+    let is_here = |name: &String| space.roads.iter().any(|road| road.name == *name);
+    if arguments.road.is_empty() && origin.roads.iter().all(is_here) {
+        conditions.roads.clone_from(&origin.roads);
+    }
+    if let (None, Some(traffic)) = (&arguments.traffic, &origin.traffic) {
+        let profile = TrafficProfile::shipped(traffic).or_else(|_| TrafficProfile::from_yaml(traffic));
+        let profile = profile.map_err(|error| RunError::Traffic { name: policy.name.clone(), error })?;
+        conditions.traffic = TrafficRecord::new(&profile);
+    }
+    for (rules, trained, others) in [
+        (&mut conditions.with, &origin.with, &arguments.rules.without),
+        (&mut conditions.without, &origin.without, &arguments.rules.with),
+    ] {
+        let more = trained.iter().filter(|rule| !rules.contains(rule) && !others.contains(rule));
+        let more: Vec<String> = more.cloned().collect();
+        rules.extend(more);
+    }
+    Ok(())
 }
 
 /// On which roads fewer vehicles of ambient traffic are there at the start of the first episode than were asked for; nothing if all

@@ -34,8 +34,7 @@ impl Progress {
 
     /// The progress of so many hours of simulated time, of which `simulated_s` are done already.
     pub fn of_hours(output: &Output, how: &'static str, hours: f64, simulated_s: f64) -> Progress {
-        let total = (60.0 * hours).ceil() as u64;
-        let count = Count::new(output, "simulated minutes", total, minutes(simulated_s).min(total));
+        let count = Count::of_hours(output, hours, simulated_s);
         Progress { count, found: 0, how, simulated_s: Some(simulated_s) }
     }
 
@@ -47,16 +46,17 @@ impl Progress {
     /// As [`Progress::episode`]; the episode took so long in the simulation.
     pub fn episode_of(&mut self, found: usize, duration_s: f64) {
         self.found += found;
-        let more = match &mut self.simulated_s {
-            None => 1,
-            Some(so_far_s) => {
-                let before = minutes(*so_far_s);
-                *so_far_s += duration_s;
-                minutes(*so_far_s) - before
-            }
-        };
+        let more = units(&mut self.simulated_s, duration_s);
         self.count.up(more, format!("{} {}", plural(self.found, "collision"), self.how));
     }
+}
+
+/// What an episode adds to the count: itself, or whole minutes if these are counted.
+fn units(simulated_s: &mut Option<f64>, duration_s: f64) -> u64 {
+    let Some(so_far_s) = simulated_s else { return 1 };
+    let before = minutes(*so_far_s);
+    *so_far_s += duration_s;
+    minutes(*so_far_s) - before
 }
 
 /// Whole minutes of a time.
@@ -71,6 +71,8 @@ const RECENT: usize = 25;
 pub struct TrainingProgress {
     count: Count,
     found: usize,
+    /// As in [`Progress`].
+    simulated_s: Option<f64>,
     /// Sums of rewards of the last episodes.
     recent: VecDeque<f64>,
 }
@@ -79,7 +81,13 @@ impl TrainingProgress {
     /// `resumed` episodes count as done already.
     pub fn new(output: &Output, total: u64, resumed: u64) -> TrainingProgress {
         let count = Count::new(output, "episodes", total, resumed);
-        TrainingProgress { count, found: 0, recent: VecDeque::new() }
+        TrainingProgress { count, found: 0, simulated_s: None, recent: VecDeque::new() }
+    }
+
+    /// As [`Progress::of_hours`].
+    pub fn of_hours(output: &Output, hours: f64, simulated_s: f64) -> TrainingProgress {
+        let count = Count::of_hours(output, hours, simulated_s);
+        TrainingProgress { count, found: 0, simulated_s: Some(simulated_s), recent: VecDeque::new() }
     }
 
     /// One more episode has been learned from.
@@ -92,7 +100,8 @@ impl TrainingProgress {
         let mean = self.recent.iter().sum::<f64>() / self.recent.len() as f64;
         let loss = trained.lesson.loss.map_or("no loss yet".to_owned(), |loss| format!("loss {loss:.3}"));
         let (found, epsilon) = (self.found, trained.exploration_epsilon);
-        self.count.up(1, format!("{found} counted, return {mean:.1}, ε {epsilon:.2}, {loss}"));
+        let more = units(&mut self.simulated_s, trained.simulated_s);
+        self.count.up(more, format!("{found} counted, return {mean:.1}, ε {epsilon:.2}, {loss}"));
     }
 }
 
@@ -154,6 +163,12 @@ struct Count {
 }
 
 impl Count {
+    /// The minutes of so many hours of simulated time, of which `simulated_s` are done already.
+    fn of_hours(output: &Output, hours: f64, simulated_s: f64) -> Count {
+        let total = (60.0 * hours).ceil() as u64;
+        Count::new(output, "simulated minutes", total, minutes(simulated_s).min(total))
+    }
+
     fn new(output: &Output, noun: &'static str, total: u64, done: u64) -> Count {
         let telling = output.telling();
         let bar = (telling == Telling::Bar).then(|| {

@@ -323,7 +323,14 @@ fn missing_of_training(
 ) -> Result<Option<String>, Failure> {
     let Ok(training) = read_yaml::<TrainSettings>(settings) else { return Ok(None) };
     let unread = |error| Failure::file("read", &directory.join("run.db"), error);
-    let (there, wanted) = (database.episodes().map_err(unread)?, training.episodes as usize);
+    // A training by time has as many episodes as it took; it is done if it has results.
+    let is_done = database.results().map_err(unread)?.is_some();
+    let there = database.episodes().map_err(unread)?;
+    let wanted = match training.hours {
+        Some(_) if is_done => there.len(),
+        Some(_) => there.len() + 1,
+        None => training.episodes as usize,
+    };
     let lacking = wanted.saturating_sub(there.len());
     let is_gap = there.last().is_some_and(|&last| last >= there.len());
     Ok(match is_gap {

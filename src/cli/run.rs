@@ -208,7 +208,8 @@ fn play_all(
     let mut progress = match &run.settings().budget {
         None => share.progress(output, "counted", &todo),
         Some(budget) => {
-            let simulated_s = 3600.0 * directory.read(|database| database.left(run.settings()))?.simulated_h;
+            let simulated_s =
+                3600.0 * directory.read(|database| database.left(Some(run.settings())))?.simulated_h;
             Progress::of_hours(output, "counted", budget.hours, simulated_s)
         }
     };
@@ -285,7 +286,7 @@ fn play_all(
     if !requirements.is_empty() {
         output.say(&requirements_text(&requirements));
     }
-    let left = directory.read(|database| database.left(run.settings()))?;
+    let left = directory.read(|database| database.left(Some(run.settings())))?;
     left.in_words().iter().for_each(|text| output.say(text));
     let is_protocol = run.settings().rows > 0;
     let tests = match is_protocol {
@@ -356,10 +357,17 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<Begun>, Fai
     can_fail_on(&arguments.fail_on, space, arguments.replays)?;
     let shard = shard::asked(output, arguments.shard.shard)?;
     let agent = policy.as_ref().map_or(&arguments.conditions.agent, |(_, policy)| &policy.name);
-    let under_test = load::named(&arguments.under_test.ads)?;
+    let under_test = match (&arguments.ads, &policy) {
+        (Some(named), _) => load::named(named)?,
+        (None, Some((_, policy))) => conditions::trained_against(policy)?,
+        (None, None) => load::named(DEFAULT_ADS)?,
+    };
     let is_protocol = by_name(agent).is_some_and(|entry| matches!(entry.kind, Kind::OneRow(_)));
     let episodes = arguments.episodes.unwrap_or(if is_protocol { 1 } else { EPISODES });
-    let settings = conditions::settings(space, &arguments.conditions, agent, under_test, episodes)?;
+    let mut settings = conditions::settings(space, &arguments.conditions, agent, under_test, episodes)?;
+    if let Some((_, policy)) = &policy {
+        conditions::as_trained(&mut settings.conditions, &arguments.conditions, policy, space)?;
+    }
     let settings = RunSettings {
         causes: arguments.causes,
         replays: arguments.replays,

@@ -146,6 +146,7 @@ train
   totals object as in `run`
   groups[] object a distinct failure of the training, as in `run`
   requirements[] object a requirement in force, as in `run`; careful drivers are tried in the first episode of each
+  left object the kinds that recur, as in `run`, those of the evaluation included; its `next_hour` is always null
   simulated_h number time driven
   policy text? path of the policy; a search has none
   rules object? what its readable rules achieve

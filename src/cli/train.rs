@@ -6,10 +6,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use avastra_base::outside::Shown;
 use avastra_campaign::emit;
-use avastra_campaign::episode::{Breach, Script};
+use avastra_campaign::episode::{EpisodeLog, Script};
 use avastra_campaign::oracle;
 use avastra_campaign::oracle::MIXED;
-use avastra_campaign::run::{Conditions, Database, EpisodeSummary, Shard, Stage, TrafficRecord, Units};
+use avastra_campaign::run::{
+    Budget, Conditions, Database, EpisodeSummary, Shard, Stage, TrafficRecord, Units,
+};
 use avastra_campaign::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
 use avastra_drivers::external::Attached;
 use avastra_lang::model::policy::{PolicyClaims, PolicyOrigin};
@@ -35,8 +37,6 @@ use super::{load, run_directory};
 
 /// Episodes between two checkpoints: at most so many are played again after a kill.
 const CHECKPOINT_EPISODES: usize = 25;
-/// Episodes on each road that the finished policy is judged by: the paper's number.
-const EVALUATION_EPISODES: u64 = 15;
 
 type Directory = run_directory::Directory<TrainSettings>;
 
@@ -68,7 +68,10 @@ pub fn train(output: &Output, arguments: &TrainArguments) -> Result<(), Failure>
     let settings = training.settings().clone();
     output.tell(&heading(&training, &directory.path));
     let stop = stop_on_interrupt();
-    let mut progress = TrainingProgress::new(output, settings.episodes as u64, training.episodes() as u64);
+    let mut progress = match settings.hours {
+        None => TrainingProgress::new(output, u64::from(settings.episodes), training.episodes() as u64),
+        Some(hours) => TrainingProgress::of_hours(output, hours, training.simulated_s()),
+    };
     while !training.is_done() && !stop.load(Ordering::Relaxed) {
         let trained = training.episode().map_err(|why| Failure::file("go on with", &directory.path, why))?;
         // No driving system is left to drive the other episodes. This one is kept with a checkpoint.
@@ -107,7 +110,11 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, Direc
     let settings = TrainSettings {
         conditions,
         agent: arguments.agent.clone(),
-        episodes: arguments.episodes,
+        episodes: arguments
+            .hours
+            .map_or(arguments.episodes, |hours| Budget { hours, until: None }.episodes(1)),
+        hours: arguments.hours,
+        evaluation: arguments.evaluate,
         seed: arguments.seed,
         hyperparameters,
     };
@@ -150,15 +157,18 @@ fn resumed(output: &Output, path: &Path) -> Result<(Training, Directory), Failur
         directory.database.return_to_checkpoint().map_err(|error| Failure::file("resume", path, error))?;
     let training = match checkpoint {
         None => Training::new(table, settings)?,
-        Some(checkpoint) => Training::resumed(table, settings, checkpoint.episodes, &checkpoint.learner)?,
+        Some(checkpoint) => {
+            let so_far = (checkpoint.episodes, directory.read(Database::trained_s)?);
+            Training::resumed(table, settings, so_far, &checkpoint.learner)?
+        }
     };
     // Only scenarios up to the checkpoint are restored; later episodes are played again.
     directory.restore(output)?;
     Ok((training, directory))
 }
 
-/// Writes an episode's counted collisions as a scenario, and the first breach of each requirement, and commits it. A checkpoint goes with it every so often, at
-/// the end, and when the user stops.
+/// Writes what an episode found as a scenario, and commits it. A checkpoint goes with it every so often, at the end, and when
+/// the user stops.
 fn keep(
     training: &Training,
     directory: &mut Directory,
@@ -169,16 +179,7 @@ fn keep(
     let TrainSettings { agent, conditions, .. } = settings;
     let player = Player { command: "train", table: training.table(), agent, conditions };
     directory.write_failure(&player, (&trained.log, &trained.summary))?;
-    let is_first = |breach: &Breach| {
-        let name = &training.table().space().requirements[breach.requirement].name;
-        directory.read(|database| database.is_breached(name)).map(|known| !known)
-    };
-    let has_first = trained.log.first_breaches().map(is_first).collect::<Result<Vec<bool>, Failure>>()?;
-    let is_critical = trained.summary.counted() > 0 || has_first.contains(&true);
-    // A training that sets its observation period writes no scenario, because a replay would use the period of the
-    // space.
-    let has_scenario = is_critical && settings.hyperparameters.observation_period_s().is_none();
-    let scenario = has_scenario
+    let scenario = has_scenario(training, &trained.log, &trained.summary)
         .then(|| directory.write_critical(&player, (&training.log_of_space(&trained.log), &trained.summary)));
     let scenario = scenario.transpose()?;
     let is_due = training.episodes().is_multiple_of(CHECKPOINT_EPISODES)
@@ -193,12 +194,44 @@ fn keep(
     })
 }
 
+/// Whether an episode becomes a scenario. Where a training sets its observation period, none does, because a replay would use the
+/// period of the space.
+fn has_scenario(training: &Training, log: &EpisodeLog, summary: &EpisodeSummary) -> bool {
+    let is_critical = summary.counted() > 0 || !log.breaches.is_empty();
+    is_critical && training.settings().hyperparameters.observation_period_s().is_none()
+}
+
+/// Plays what was learned, and keeps its findings. Its episodes are numbered on from those of the training.
+fn evaluated(training: &Training, directory: &mut Directory) -> Result<Evaluation, Failure> {
+    let TrainSettings { agent, conditions, evaluation, seed, .. } = training.settings();
+    let player = Player { command: "train", table: training.table(), agent, conditions };
+    let in_words = |draw: &Draw| emit::action_text(training.table(), draw);
+    let mut kept = Ok(());
+    let mut keep = |mut summary: EpisodeSummary, log: &EpisodeLog| -> Result<(), Failure> {
+        summary.episode += training.episodes();
+        let has_scenario = has_scenario(training, log, &summary);
+        let scenario =
+            has_scenario.then(|| directory.write_critical(&player, (log, &summary))).transpose()?;
+        directory.write_failure(&player, (log, &summary))?;
+        let space = training.table().space();
+        directory.write(|database| database.add(&summary, log, space, in_words, scenario.as_deref()))
+    };
+    let test = (u64::from(*evaluation), *seed);
+    let evaluation = evaluate(training.arena(), &|| training.agent().actor(), test, &mut |summary, log| {
+        if kept.is_ok() {
+            kept = keep(summary, log);
+        }
+    });
+    kept.map(|()| evaluation)
+}
+
 /// Evaluates the policy, writes it, and prints the result of the training.
 fn finish(output: &Output, training: &Training, mut directory: Directory) -> Result<(), Failure> {
     let settings = training.settings();
-    let test = (EVALUATION_EPISODES, settings.seed);
+    let totals = directory.read(Database::totals)?;
+    let failures = directory.read(Database::failures)?;
     let working = Working::new(output, "playing what it learned");
-    let evaluation = evaluate(training.arena(), &|| training.agent().actor(), test);
+    let evaluation = evaluated(training, &mut directory)?;
     drop(working);
     let kept = training.agent().policy().map(|acting| {
         output.tell("distilling rules from the network");
@@ -208,7 +241,6 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
         Ok::<_, Failure>((path, policy))
     });
     let kept = kept.transpose()?;
-    let totals = directory.read(Database::totals)?;
     let simulated_h = directory.read(Database::trained_s)? / 3600.0;
     output.say(&format!(
         "\n{} in {simulated_h:.1} h of simulated time: {}, {} counted in {}",
@@ -229,12 +261,14 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
             );
         }
     }
-    output.say(&format!(
-        "what it learned, on {} of its own: {} counted in {}",
-        plural(played(settings, &evaluation), "episode"),
-        plural(evaluation.counted as usize, "collision"),
-        plural(evaluation.colliding as usize, "episode"),
-    ));
+    if evaluation.episodes > 0 {
+        output.say(&format!(
+            "what it learned, on {} of its own: {} counted in {}",
+            plural(played(settings, &evaluation), "episode"),
+            plural(evaluation.counted as usize, "collision"),
+            plural(evaluation.colliding as usize, "episode"),
+        ));
+    }
     find_recurrence(output, training, &mut directory)?;
     let groups = directory.read(Database::groups)?;
     if !groups.is_empty() {
@@ -242,6 +276,10 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
         if training.arena().program().is_some_and(|program| !program.is_deterministic()) {
             output.say(&format!("of how often they recur: {MIXED}"));
         }
+    }
+    let left = directory.read(|database| database.left(None))?;
+    if oracle::can_replay(training.arena().ads()) {
+        output.say(&left.kinds_text());
     }
     let requirements = directory.read(Database::requirements)?;
     if !requirements.is_empty() {
@@ -258,7 +296,6 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
         }
         None => output.say(&search_text(&directory.path, &critical)),
     }
-    let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {
         let place = format!(" in the training; each is in {}/failures", directory.path.shown());
         output.say(&failures_text(&failures, &place));
@@ -295,7 +332,7 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
     write(&directory.path.join("results.json"), &format!("{text}\n"))?;
     output.result(serde_json::json!({
         "reproducible": is_reproducible,
-        "directory": directory.path, "totals": totals, "groups": groups, "requirements": requirements, "policy": kept.as_ref().map(|(path, _)| path),
+        "directory": directory.path, "totals": totals, "groups": groups, "requirements": requirements, "left": left, "policy": kept.as_ref().map(|(path, _)| path),
         "rules": rules, "simulated_h": simulated_h, "failures": failures, "evaluation": evaluation,
     }));
     // If no episode was driven to its end, nothing was learned, so the command fails.
@@ -367,18 +404,18 @@ fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Pol
     let network = acting.network();
     let policy = Policy {
         name,
-        docs: vec![headline(settings, evaluation)],
+        docs: vec![headline(training, evaluation)],
         origin: origin(
             &settings.conditions,
             training.arena().attached().as_ref(),
             &settings.agent,
-            (settings.seed, u64::from(settings.episodes)),
+            (settings.seed, training.episodes() as u64),
         ),
         layers: network.shape().layers.clone(),
         dueling: network.shape().dueling,
         hyperparameters: acting.settings().record(),
         parameters: network.parameters().to_vec(),
-        claims: Some(PolicyClaims {
+        claims: (evaluation.episodes > 0).then(|| PolicyClaims {
             episodes: evaluation.episodes,
             seed: evaluation.seed,
             collisions: evaluation.collisions,
@@ -429,17 +466,24 @@ fn write_policy(policy: &Policy, space: &Space, directory: &Path) -> Result<Path
 }
 
 /// The policy's headline: what it is, in a sentence.
-fn headline(settings: &TrainSettings, evaluation: &Evaluation) -> String {
+fn headline(training: &Training, evaluation: &Evaluation) -> String {
+    let settings = training.settings();
+    let trained = format!(
+        "{} ({}) after {} on {}",
+        settings.agent,
+        settings.hyperparameters.preset(),
+        plural(training.episodes(), "episode"),
+        settings.conditions.roads.join(", "),
+    );
+    if evaluation.episodes == 0 {
+        return format!("{trained}.");
+    }
     let failed = match failed(evaluation) {
         0 => String::new(),
         failed => format!(" The driving system failed in {failed} of them."),
     };
     format!(
-        "{} ({}) after {} on {}: {} in {} of its own.{failed}",
-        settings.agent,
-        settings.hyperparameters.preset(),
-        plural(settings.episodes as usize, "episode"),
-        settings.conditions.roads.join(", "),
+        "{trained}: {} in {} of its own.{failed}",
         plural(evaluation.counted as usize, "counted collision"),
         plural(played(settings, evaluation), "episode"),
     )
@@ -459,7 +503,10 @@ fn heading(training: &Training, directory: &Path) -> String {
         settings.hyperparameters.preset(),
         training.arena().ads_name(),
         profile_text(settings.conditions.profile.as_ref()),
-        plural(settings.episodes as usize, "episode"),
+        match settings.hours {
+            Some(hours) => format!("{hours} h of simulated time"),
+            None => plural(settings.episodes as usize, "episode"),
+        },
         settings.conditions.roads.join(", "),
         settings.seed,
         directory.shown()

@@ -33,13 +33,15 @@ fn training(entry: &Entry, checkpoint: Option<(usize, &[u8])>) -> Option<Trainin
         conditions: Conditions { roads, ..Conditions::of(usual.space()) },
         agent: entry.name.to_owned(),
         episodes: 24,
+        hours: None,
+        evaluation: 15,
         seed: 3,
         hyperparameters,
     };
     let table = usual.table().clone();
     let training = match checkpoint {
         None => Training::new(table, settings),
-        Some((episodes, bytes)) => Training::resumed(table, settings, episodes, bytes),
+        Some((episodes, bytes)) => Training::resumed(table, settings, (episodes, 0.0), bytes),
     };
     Some(training.expect("the settings name what exists"))
 }

@@ -267,9 +267,10 @@ fn a_page_shows_the_requirements_of_its_run() {
 fn a_policy_says_that_it_plays_where_it_has_not_learned() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let run = |more: &[&str]| {
-        let out = text(&scratch.path().join(more.join("").replace('/', "")));
+        let out = text(&scratch.path().join(format!("run{}", more.join("").replace('/', ""))));
         let policy = ["run", "--policy", "policies/corner.ava", "--episodes", "1", "--out", &out];
-        outcome(&mut avastra(&[&policy[..], more].concat())).2
+        let (_, stdout, stderr) = outcome(&mut avastra(&[&policy[..], more].concat()));
+        stdout + &stderr
     };
     let dirty = "scenarios/ads/degraded.yaml";
     assert!(!run(&["--road", "corner", "--ads", dirty]).contains("was trained"));
@@ -279,8 +280,12 @@ fn a_policy_says_that_it_plays_where_it_has_not_learned() {
     {
         assert!(told.contains(wanted), "{wanted}: {told}");
     }
-    let told = run(&["--road", "corner"]);
+    let told = run(&["--ads", "modular"]);
     assert!(told.contains("and plays against it with its default profile"), "{told}");
+    // Without a name, it plays as it was trained.
+    let told = run(&[]);
+    assert!(told.contains("changed settings of ") && told.contains(" on corner, "), "{told}");
+    assert!(!told.contains("was trained"), "{told}");
 }
 
 /// A scheduler ends a command by SIGTERM: what was played is summed up, and can be gone on with.

@@ -5,10 +5,12 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
+use serde_json::Value;
+
 use avastra::rng::{Stream, below, stream};
 
 use crate::cases::{entries, root};
-use crate::command::{avastra, change, done, fails, outcome};
+use crate::command::{avastra, change, done, fails, last_line, outcome};
 use crate::policies::{load, moved, sealed};
 use crate::report::index_of;
 use crate::world::{FLICKER, SMALL};
@@ -150,8 +152,45 @@ fn scenarios_of_a_training_that_are_gone_or_edited_are_noticed() {
         && stderr.contains("its results were changed since they were written");
     assert!(status == 0 && is_told, "{stderr}");
     let index = index_of(&read(&page));
-    assert_eq!(index["overview"]["totals"]["episodes"], 11);
+    // Of 12 in the training and 15 that judged what it learned.
+    assert_eq!(index["overview"]["totals"]["episodes"], 26);
     assert!(index["overview"]["evaluation"].is_null());
+}
+
+/// A training by time ends where it would with no kill, keeps what its evaluation found, and names the kinds that recur.
+#[test]
+fn a_training_by_time_keeps_all_that_it_finds() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let train = |out: &str, more: &[&str]| {
+        let out = scratch.path().join(out).display().to_string();
+        let words =
+            ["train", "scenarios/avastra45_law.ava", "--ads", "reactive", "--agent", "bandit", "--road"];
+        let how = ["residential", "--seed", "5", "--format", "json", "--out", &out];
+        let result = last_line(&done(&[&words[..], &how, more].concat()));
+        let database =
+            rusqlite::Connection::open(scratch.path().join(out).join("run.db")).expect("a database");
+        (result, database)
+    };
+    let count = |database: &rusqlite::Connection, what: &str| -> i64 {
+        database.query_row(&format!("SELECT count(*) FROM {what}"), [], |row| row.get(0)).expect("a number")
+    };
+    let (found, database) = train("timed", &["--hours", "0.4", "--evaluate", "4"]);
+    let simulated_h = found["simulated_h"].as_f64().expect("a number");
+    assert!((0.4..0.45).contains(&simulated_h), "{found}");
+    let learned = count(&database, "learning");
+    assert_eq!(count(&database, "episode"), learned + 4, "those of the evaluation are kept");
+    assert_eq!(found["totals"]["episodes"], learned, "{found}");
+    // Each episode with a finding has a scenario, not only the first with a breach of a requirement.
+    let critical = "episode WHERE counted > 0 OR episode IN (SELECT episode FROM breach)";
+    assert!(count(&database, critical) > 1, "{found}");
+    assert_eq!(count(&database, "scenario"), count(&database, critical));
+    let kinds = found["left"]["kinds"].as_array().expect("a list");
+    assert!(!kinds.is_empty() && found["left"]["next_hour"].is_null(), "{}", found["left"]);
+
+    let (found, database) = train("unjudged", &["--episodes", "3", "--evaluate", "0"]);
+    assert_eq!((count(&database, "episode"), &found["evaluation"]["episodes"]), (3, &Value::from(0)));
+    let out = scratch.path().join("wrong").display().to_string();
+    fails(&["train", "scenarios/avastra45.ava", "--hours", "0", "--out", &out], "the budget is 0 h");
 }
 
 #[test]

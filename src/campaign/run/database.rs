@@ -305,15 +305,6 @@ impl Database {
         })
     }
 
-    /// Whether a requirement was breached in an episode.
-    ///
-    /// # Errors
-    /// If the file cannot be read.
-    pub fn is_breached(&self, requirement: &str) -> Result<bool, DatabaseError> {
-        let query = "SELECT EXISTS (SELECT 1 FROM breach WHERE requirement = ?)";
-        Ok(self.connection.query_row(query, [requirement], |row| row.get(0))?)
-    }
-
     /// The requirements that were in force, by name: how often each was breached, and how near it came to that.
     ///
     /// # Errors

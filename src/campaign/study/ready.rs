@@ -85,6 +85,8 @@ impl Study {
             conditions: self.conditions(agent, roads),
             agent: agent.name.clone(),
             episodes: plan.episodes,
+            hours: None,
+            evaluation: 0,
             seed: self.training_seed(job.number),
             hyperparameters: plan.hyperparameters.clone(),
         };

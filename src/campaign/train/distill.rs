@@ -43,7 +43,7 @@ pub fn judge_rules(
     test: (u64, u64),
 ) -> RulesClaims {
     let visiting = VisitingPolicy::new(&policy.with_rules(rules.clone()));
-    let evaluation = evaluate(arena, &|| Box::new(visiting.clone()), test);
+    let evaluation = evaluate(arena, &|| Box::new(visiting.clone()), test, &mut |_, _| {});
     let (mut states, mut same, mut lost) = (0_u64, 0_u64, 0.0);
     for visit in visiting.visits() {
         let row = chosen_by(rules, &visit.observation, &visit.open);

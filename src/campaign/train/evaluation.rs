@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use sha2::{Digest, Sha256};
 
 use crate::episode;
-use crate::episode::End;
+use crate::episode::{End, EpisodeLog};
 use crate::run::{Arena, EpisodeSummary, choose};
 use avastra_base::rng;
 use avastra_base::rng::Stream;
@@ -33,11 +33,12 @@ pub struct Evaluation {
     pub failures: BTreeMap<FailureKind, u64>,
 }
 
-/// Plays a number of episodes on each road; `make` gives a fresh agent for each.
+/// Plays a number of episodes on each road; `make` gives a fresh agent for each, and `watch` sees what came of it.
 pub fn evaluate(
     arena: &Arena,
     make: &dyn Fn() -> Box<dyn Agent>,
     (episodes, seed): (u64, u64),
+    watch: &mut dyn FnMut(EpisodeSummary, &EpisodeLog),
 ) -> Evaluation {
     let mut traces = Sha256::new();
     let mut found = Evaluation { episodes, seed, ..Evaluation::default() };
@@ -49,7 +50,8 @@ pub fn evaluate(
         agent.begin(seed);
         let mut choose = |moment: &episode::Moment| choose(agent.as_mut(), moment);
         let log = episode::run(&setup, &mut choose);
-        let counted = EpisodeSummary::judged(&setup, number as usize, &log).counted() as u64;
+        let summary = EpisodeSummary::judged(&setup, number as usize, &log);
+        let counted = summary.counted() as u64;
         sum += log.steps.iter().map(|step| step.reward).sum::<f64>();
         found.collisions += log.collisions.len() as u64;
         found.counted += counted;
@@ -59,6 +61,7 @@ pub fn evaluate(
             *found.failures.entry(kind).or_default() += 1;
         }
         traces.update(log.trace());
+        watch(summary, &log);
     }
     let return_mean = sum / (episodes * arena.roads() as u64).max(1) as f64;
     Evaluation { return_mean, trace: traces.finalize().into(), ..found }

@@ -9,7 +9,7 @@ use ndarray::Array1;
 use crate::episode;
 use crate::episode::{Choice, End, EpisodeLog, Moment, Play, Script, Setup};
 use crate::run::{
-    Arena, Conditions, EpisodeSummary, Finding, Offers, RunError, agent_named, check_episodes, legal,
+    Arena, Budget, Conditions, EpisodeSummary, Finding, Offers, RunError, agent_named, check_episodes, legal,
 };
 use avastra_base::rng;
 use avastra_base::rng::Stream;
@@ -28,8 +28,13 @@ pub struct TrainSettings {
     /// Episodes go round its roads, one each.
     pub conditions: Conditions,
     pub agent: String,
-    /// Episodes on all roads together.
+    /// Episodes on all roads together. With `hours`, the most that there can be.
     pub episodes: u32,
+    /// Ends it by simulated time in place of a number of episodes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hours: Option<f64>,
+    /// Episodes on each road that judge what was learned; 0 for none.
+    pub evaluation: u32,
     pub seed: u64,
     /// The agent's hyperparameters.
     pub hyperparameters: Settings,
@@ -42,6 +47,8 @@ pub struct Training {
     agent: Box<dyn Trainable>,
     /// Number of the next episode.
     next: usize,
+    /// Simulated time so far, s.
+    simulated_s: f64,
 }
 
 /// An episode, and what it taught.
@@ -68,22 +75,22 @@ impl Training {
     pub fn new(table: ActionTable, settings: TrainSettings) -> Result<Training, RunError> {
         let (arena, rows) = prepared(table, &settings)?;
         let agent = settings.hyperparameters.build(rows, settings.seed);
-        Ok(Training { arena, settings, agent, next: 0 })
+        Ok(Training { arena, settings, agent, next: 0, simulated_s: 0.0 })
     }
 
-    /// A training as a checkpoint left it after so many episodes.
+    /// A training as a checkpoint left it after so many episodes, and so much simulated time, s.
     ///
     /// # Errors
     /// As [`Training::new`], and if the checkpoint is not of such a training.
     pub fn resumed(
         table: ActionTable,
         settings: TrainSettings,
-        episodes: usize,
+        (episodes, simulated_s): (usize, f64),
         checkpoint: &[u8],
     ) -> Result<Training, RunError> {
         let (arena, rows) = prepared(table, &settings)?;
         let agent = settings.hyperparameters.restore(rows, checkpoint).ok_or(RunError::Checkpoint)?;
-        Ok(Training { arena, settings, agent, next: episodes })
+        Ok(Training { arena, settings, agent, next: episodes, simulated_s })
     }
 
     pub fn settings(&self) -> &TrainSettings {
@@ -109,7 +116,19 @@ impl Training {
     }
 
     pub fn is_done(&self) -> bool {
-        self.next >= self.settings.episodes as usize
+        self.over() >= 1.0
+    }
+
+    /// How much of it is over; 1 at its end.
+    fn over(&self) -> f64 {
+        let of_episodes = self.next as f64 / f64::from(self.settings.episodes);
+        let of_time = self.settings.hours.map(|hours| self.simulated_s / (3600.0 * hours));
+        of_time.map_or(of_episodes, |of_time| of_time.max(of_episodes))
+    }
+
+    /// Simulated time so far, s.
+    pub fn simulated_s(&self) -> f64 {
+        self.simulated_s
     }
 
     /// Plays the next episode and learns from it.
@@ -120,7 +139,7 @@ impl Training {
         let number = self.next;
         let road = number % self.arena.roads();
         let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
-        self.agent.progress(number as f64 / f64::from(self.settings.episodes));
+        self.agent.progress(self.over());
         let exploration_epsilon = self.agent.exploration_epsilon();
         let mut setup = self.arena.setup(road, seed);
         setup.start.ambient = self.settings.conditions.ambient;
@@ -140,6 +159,7 @@ impl Training {
         let mut rng = rng::stream(self.settings.seed, Stream::Replay, number as u64);
         let lesson = self.agent.learn(&trajectory, &mut rng)?;
         self.next += 1;
+        self.simulated_s += log.duration_s;
         Ok(TrainedEpisode {
             sum: trajectory.sum(),
             exploration_epsilon,
@@ -247,6 +267,7 @@ fn experiences(
 /// Looks everything up that the settings name.
 fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<Rows>), RunError> {
     check_episodes(settings.episodes)?;
+    settings.hours.map_or(Ok(()), |hours| Budget { hours, until: None }.check())?;
     if matches!(agent_named(&settings.agent)?.kind, Kind::Ready(_) | Kind::OneRow(_)) {
         return Err(RunError::Unteachable { name: settings.agent.clone() });
     }

@@ -59,11 +59,14 @@ pub struct ConditionArguments {
 pub struct RunArguments {
     /// The space [default: the one compiled last here].
     pub file: Option<PathBuf>,
-    #[command(flatten)]
-    pub under_test: UnderTestArguments,
+    /// Driving system under test: a name; a profile of `modular` or of a program of your own, a YAML file; a command
+    /// that starts your own, `tcp:HOST:PORT` or `unix:PATH` [default: modular, or that of the policy].
+    #[arg(long, value_name = "NAME|FILE|COMMAND", value_parser = Named::ADS)]
+    pub ads: Option<String>,
     #[command(flatten)]
     pub conditions: ConditionArguments,
-    /// Let a trained policy choose them; without FILE on its own space.
+    /// Let a trained policy choose them. It plays as it was trained: on its space and roads, against its driving system and
+    /// traffic, with its rules. What you name takes their place.
     #[arg(long, value_name = "POLICY", conflicts_with = "agent")]
     pub policy: Option<PathBuf>,
     /// Which face of the policy acts: its network, or the rules distilled from it.

@@ -30,6 +30,12 @@ pub struct TrainArguments {
     /// Episodes on all roads together.
     #[arg(long, default_value_t = 750, value_parser = clap::value_parser!(u32).range(1..=i64::from(avastra_campaign::run::EPISODES_MAX)))]
     pub episodes: u32,
+    /// Train for so many simulated hours in place of a number of episodes.
+    #[arg(long, value_name = "H", conflicts_with = "episodes")]
+    pub hours: Option<f64>,
+    /// Episodes on each road that judge what was learned; 0 for none, and then the policy claims nothing.
+    #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(0..=1000))]
+    pub evaluate: u32,
     /// Seed of the whole training.
     #[arg(long, default_value_t = 1, value_parser = super::seed)]
     pub seed: u64,
@@ -45,7 +51,7 @@ pub struct TrainArguments {
     #[arg(long)]
     pub self_contained: bool,
     /// Go on with an interrupted run directory; its own settings hold, and the program that they name is started.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "preset", "config", "episodes", "seed", "traffic", "out", "self_contained", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "preset", "config", "episodes", "hours", "evaluate", "seed", "traffic", "out", "self_contained", "without", "with"])]
     pub resume: Option<PathBuf>,
 }
 

@@ -21,7 +21,7 @@ pub fn judge(table: &ActionTable, policy: &Policy) -> Result<Vec<String>, Failur
     let Some(claims) = &policy.claims else { return Ok(Vec::new()) };
     let arena = training_arena(table, policy, &acting, &policy.origin.roads)?;
     let test = (claims.episodes, claims.seed);
-    let found = evaluate(&arena, &|| Box::new(acting.clone()), test);
+    let found = evaluate(&arena, &|| Box::new(acting.clone()), test, &mut |_, _| {});
     let trace = digest_text(&found.trace);
     let pairs = [
         ("collisions", claims.collisions.to_string(), found.collisions.to_string()),
