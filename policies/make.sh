@@ -1,7 +1,7 @@
 #!/bin/sh
 # Makes the shipped policies again: `sh policies/make.sh`, from the repository's root.
 #
-# One training for each road, with the default preset, against the driving system with dirty sensors: against the
+# One training for each road, with the default preset, against a driving system whose planning yields to nobody: against the
 # default profile there is next to nothing to learn. The same version on any machine writes the same bytes. What was
 # made before is replaced only when all four are there and their claims hold.
 set -eu
@@ -15,7 +15,7 @@ rm -rf "$work"
 mkdir -p "$work"
 
 for road in residential corner crossroad boulevard; do
-    "$avastra" train "$space" --road "$road" --ads scenarios/ads/degraded.yaml --episodes 750 --seed 1 --out "$work/$road"
+    "$avastra" train "$space" --road "$road" --ads scenarios/ads/faults/planning_never_yields.yaml --episodes 750 --seed 1 --out "$work/$road"
     # A policy may move: its seal covers everything but the path of its `use`.
     sed 's|^use "[^"]*"|use "../scenarios/avastra45.ava"|' \
         "$work/$road/policy/${road}_ddqn_1.ava" > "policies/$road.ava.new"

@@ -272,8 +272,8 @@ fn a_policy_says_that_it_plays_where_it_has_not_learned() {
         let (_, stdout, stderr) = outcome(&mut avastra(&[&policy[..], more].concat()));
         stdout + &stderr
     };
-    let dirty = "scenarios/ads/degraded.yaml";
-    assert!(!run(&["--road", "corner", "--ads", dirty]).contains("was trained"));
+    let same = "scenarios/ads/faults/planning_never_yields.yaml";
+    assert!(!run(&["--road", "corner", "--ads", same]).contains("was trained"));
     let told = run(&["--road", "crossroad", "--ads", "idm", "--traffic", "released"]);
     for wanted in
         ["was trained on corner, and plays on crossroad", "and plays against idm", "and plays with released"]
@@ -284,7 +284,7 @@ fn a_policy_says_that_it_plays_where_it_has_not_learned() {
     assert!(told.contains("and plays against it with its default profile"), "{told}");
     // Without a name, it plays as it was trained.
     let told = run(&[]);
-    assert!(told.contains("changed settings of ") && told.contains(" on corner, "), "{told}");
+    assert!(told.contains("planning.never_yields: true") && told.contains(" on corner, "), "{told}");
     assert!(!told.contains("was trained"), "{told}");
 }
 

@@ -8,6 +8,7 @@ use avastra_campaign::run::{
     self, Database, DatabaseError, HeatMap, Profile, RequirementCount, TrafficRecord,
 };
 use avastra_drivers::external::Attached;
+use avastra_lang::syntax::read_yaml;
 use avastra_world::action::ActionTable;
 
 /// The results of a run or a training: totals, groups of similar failures, rows on roads, refusals, the curve of
@@ -33,7 +34,7 @@ pub fn of_run(
         "kind": if learning.is_empty() { "run" } else { "training" },
         "settings": settings, "conditions": conditions(settings), "totals": totals, "simulated_h": simulated_s / 3600.0,
         "requirements": requirements(database, table)?, "mixed": mixed(settings),
-        "groups": database.groups()?, "refusals": database.refusals()?, "failures": database.failures()?,
+        "groups": database.groups()?, "left": database.left(read_yaml(settings).ok().as_ref())?, "refusals": database.refusals()?, "failures": database.failures()?,
         "rows": rows, "coverage": database.coverage()?, "learning": learning,
         "evaluation": results.map(|results| &results["evaluation"]),
     }))

@@ -31,7 +31,7 @@ export function showOverview(place, data, missing = null) {
     data.remarks.map((remark) => el("p", { class: "warning" }, remark)),
     overview?.protocol && protocolTiles(overview.protocol),
     overview && required(overview, scenarios),
-    overview && results(overview),
+    overview && results(overview, scenarios),
     overview && heat(overview, scenarios),
     scenarios.length > 0 &&
       el("section", { "aria-labelledby": "h-list" }, el("h2", { id: "h-list" }, "Scenarios"), list),
@@ -50,10 +50,14 @@ export function showOverview(place, data, missing = null) {
 }
 
 /** What was measured, by what the directory holds. */
-function results(overview) {
+function results(overview, scenarios) {
   const of = {
-    run: () => null,
-    training: () => [overview.evaluation && evaluation(overview.evaluation), learning(overview.learning)],
+    run: () => kinds(overview.left, scenarios),
+    training: () => [
+      kinds(overview.left, scenarios),
+      overview.evaluation && evaluation(overview.evaluation),
+      learning(overview.learning),
+    ],
     study: () => study(overview.study),
     estimate: () => estimate(overview.estimate, overview.frame),
   };
@@ -217,6 +221,28 @@ function required({ requirements }, scenarios) {
     { "aria-labelledby": "h-required", id: "required" },
     el("h2", { id: "h-required" }, "Requirements"),
     table("What the ego vehicle must keep; a click on a name shows the formula", heads, rows),
+  );
+}
+
+/** The kinds of failures that recur, since when each is known, and the chance of another. */
+function kinds({ simulated_h: hours, kinds: found, next_hour: next }, scenarios) {
+  if (found.length === 0 && !next) return null;
+  const rows = found.map((of) => [of.kind, figure(of.first_h, "h", 1), String(of.episodes), exampleOf(of, scenarios)]);
+  const points = [[0, 0], ...found.map((of, i) => [of.first_h, i + 1]), [hours, found.length]];
+  return el(
+    "section",
+    { "aria-labelledby": "h-kinds", id: "kinds" },
+    el("h2", { id: "h-kinds" }, "Kinds of failures that recur"),
+    next &&
+      el(
+        "p",
+        { class: "lead" },
+        `The chance that an hour more shows a new kind is at most ${next.high.toFixed(2)} ` +
+          `(best guess ${next.chance.toFixed(2)}).`,
+      ),
+    found.length > 0 &&
+      table("In the order in which they were seen first", ["Kind", "First after", "Episodes", "First"], rows),
+    found.length > 1 && next && curve("Kinds seen so far", points, "simulated hours", 1),
   );
 }
 

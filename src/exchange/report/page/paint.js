@@ -39,6 +39,21 @@ export function palette() {
 }
 
 /**
+ * The ground of the reason lane.
+ * @param {import("./data").Restraint} restraint
+ * @param {Record<string, string>} colours
+ */
+export function restraintColour(restraint, colours) {
+  const [colour, share] = {
+    hard: [colours.danger, 45],
+    stops: [colours.warn, 40],
+    follows: [colours.accent, 28],
+    free: [colours.muted, 18],
+  }[restraint];
+  return `color-mix(in srgb, ${colour} ${share}%, ${colours.paper})`;
+}
+
+/**
  * What draws on an element.
  * @param {HTMLCanvasElement} element
  */

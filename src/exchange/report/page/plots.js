@@ -1,6 +1,6 @@
 // What happened over time: speed, acceleration, ProC, margins, the reason lane and the actions, under one cursor.
 import { TimeAxis } from "./axis.js";
-import { Canvas, contextOf, palette } from "./paint.js";
+import { Canvas, contextOf, palette, restraintColour } from "./paint.js";
 import { figure } from "./words.js";
 
 /** @import { Branched, Breach, Margin } from "./data" */
@@ -345,18 +345,4 @@ function drawTimes(canvas, axis, top) {
 function median(numbers) {
   const sorted = [...numbers].sort((a, b) => a - b);
   return sorted[Math.floor(sorted.length / 2)] ?? 0;
-}
-
-/**
- * @param {import("./data").Restraint} restraint
- * @param {Record<string, string>} colours
- */
-function restraintColour(restraint, colours) {
-  const [colour, share] = {
-    hard: [colours.danger, 45],
-    stops: [colours.warn, 40],
-    follows: [colours.accent, 28],
-    free: [colours.muted, 18],
-  }[restraint];
-  return `color-mix(in srgb, ${colour} ${share}%, ${colours.paper})`;
 }

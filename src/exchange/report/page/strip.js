@@ -7,8 +7,8 @@ import { atTime, inHundred } from "./words.js";
 export const STILL_LAYERS = new Set(["truth", "signals"]);
 
 /**
- * The five moments of a scenario: four seconds up to its event, or evenly through it. The moment from which on it was likely
- * takes the place of the nearest.
+ * The five moments of a scenario: four seconds up to its event, or evenly through it. The moment from which on it was
+ * likely takes the place of the nearest.
  * @param {Recording} recording
  * @param {Event | null} event
  */
