@@ -165,7 +165,7 @@ fn play_all(
     let critical = directory.critical(output)?;
     output.say(&critical_text(&path, &critical, &[]));
     if !critical.is_empty() {
-        output.say(&next_text(&path, &critical, &[]));
+        output.say(&next_text(&path, &critical, false, &[]));
     }
     let is_reproducible = is_reproducible(output, estimate.run().arena().program());
     output.result(serde_json::json!({

@@ -324,7 +324,8 @@ fn play_all(
     }
     // A protocol is complete, and failures say themselves what to do.
     if is_over && (!critical.is_empty() || !kept.is_empty() || !is_protocol && totals.failed == 0) {
-        output.say(&next_text(&directory.path, &critical, &kept));
+        let recurs = left.kinds.iter().any(|kind| kind.worst.is_some());
+        output.say(&next_text(&directory.path, &critical, recurs, &kept));
     }
     let failures = directory.read(Database::failures)?;
     if !failures.is_empty() {
@@ -788,10 +789,15 @@ pub fn critical_text(directory: &Path, files: &[PathBuf], found: &[FoundIn]) -> 
     text
 }
 
-/// What to do next: look at the findings and make the first of them small, or look at the nearest misses, or find more.
-pub fn next_text(directory: &Path, critical: &[PathBuf], kept: &[PathBuf]) -> String {
+/// What to do next: look at the findings and make the worst of each kind small, or the first of them if none is known to recur, or
+/// look at the nearest misses, or find more.
+pub fn next_text(directory: &Path, critical: &[PathBuf], recurs: bool, kept: &[PathBuf]) -> String {
     let directory = for_shell(directory);
     match (critical.first(), kept) {
+        (Some(_), _) if recurs => format!(
+            "next: avastra report {directory} makes a page to watch them;\n      avastra shrink {directory} looks for the\n      \
+             smallest scenario of each kind that recurs"
+        ),
         (Some(first), _) => format!(
             "next: avastra report {directory} makes a page to watch them;\n      avastra shrink {} looks for the\n      \
              smallest scenario that fails so",

@@ -349,6 +349,34 @@ pub fn what_was_begun(directory: &Path) -> Option<Kind> {
     KINDS.into_iter().find(|kind| (kind.is_in)(directory))
 }
 
+/// The scenarios of a run or a training that are about the worst finding of each kind that recurs.
+///
+/// # Errors
+/// If it is no such directory, or nothing recurs in it.
+pub fn worst_of_each_kind(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let (settings, file) = (directory.join("run.yaml"), directory.join("run.db"));
+    let shown = directory.shown();
+    if !settings.is_file() {
+        return Err(Failure::usage(format!("`{shown}` is no directory of a run: name scenarios")));
+    }
+    let settings = load::text(&settings)?;
+    let unread = |error| Failure::file("read", &file, error);
+    let (database, _) = open_to_read::<run::Database>(&file, &settings)?;
+    let left = database.left(read_yaml(&settings).ok().as_ref()).map_err(unread)?;
+    // Only names that a scenario has are names of files.
+    let written = written(directory, database.scenarios().map_err(unread)?);
+    let is_worst = |path: &Path| {
+        let name = path.file_stem().unwrap_or_default();
+        left.kinds.iter().any(|kind| kind.worst.as_deref().is_some_and(|worst| name == worst))
+    };
+    let found: Vec<PathBuf> =
+        written.into_iter().map(|(path, _)| path).filter(|path| is_worst(path)).collect();
+    if found.is_empty() {
+        return Err(Failure::usage(format!("nothing recurs in `{shown}`: name scenarios")));
+    }
+    Ok(found)
+}
+
 /// Whether the settings in `run.yaml` are those of a training; `None` if they cannot be read.
 pub fn is_training(directory: &Path) -> Option<bool> {
     let text = load::read(&directory.join("run.yaml")).ok()?;

@@ -11,7 +11,7 @@ use avastra_drivers::Selected;
 use avastra_lang::model::vocabulary::Word;
 use avastra_lang::model::{Claim, Space};
 
-use super::arguments::ShrinkArguments;
+use super::arguments::{FilesArguments, ShrinkArguments};
 use super::error::Failure;
 use super::files::{folder, make, without_links, write_answers, write_result};
 use super::findings::needs_program;
@@ -21,6 +21,7 @@ use super::look;
 use super::output::{Output, plural};
 use super::parallel::each_file;
 use super::replay::refutation;
+use super::run_directory;
 
 /// The folder of the shrunk scenarios, beside the scenarios. A run's findings stay apart from files made of them.
 pub const FOLDER: &str = "shrunk";
@@ -36,18 +37,24 @@ pub fn found_name(shrunk: &str) -> &str {
     shrunk.strip_suffix(SUFFIX).unwrap_or(shrunk)
 }
 
-/// Writes each file's scenario as small as possible, and checks every claim of what it wrote.
+/// Writes each file's scenario as small as possible, and checks every claim of what it wrote. Of a run's directory it takes the
+/// worst finding of each kind.
 pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failure> {
-    if let Some(path) = arguments.output.as_ref().filter(|_| arguments.many.files.len() > 1) {
+    let files = arguments.many.files.iter().map(|path| match path.is_dir() {
+        true => run_directory::worst_of_each_kind(path),
+        false => Ok(vec![path.clone()]),
+    });
+    let files = files.collect::<Result<Vec<_>, Failure>>()?.concat();
+    let many = FilesArguments { files, jobs: arguments.many.jobs };
+    if let Some(path) = arguments.output.as_ref().filter(|_| many.files.len() > 1) {
         let path = path.shown();
         return Err(Failure::usage(format!(
             "`--out {path}` is for one file: of several, each is written to a folder `{FOLDER}`"
         )));
     }
     let asked = load::asked(arguments.against.ads.as_deref())?;
-    let shrunk = each_file(output, &arguments.many, asked.external.as_ref(), |file| {
-        smaller(output, file, arguments, &asked)
-    })?;
+    let shrunk =
+        each_file(output, &many, asked.external.as_ref(), |file| smaller(output, file, arguments, &asked))?;
     let done = &shrunk.done;
     for small in done {
         output.tell(&small.in_words());

@@ -47,6 +47,30 @@ fn what_a_breach_needs_is_kept() {
     expect_snapshot("shrinks", "breaches", &told);
 }
 
+/// Of a run's directory, the worst finding of each kind that recurs is made small: one scenario for a kind.
+#[test]
+fn of_a_run_the_worst_of_each_kind_is_shrunk() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("run").display().to_string();
+    let fault = "scenarios/ads/faults/planning_never_yields.yaml";
+    let run = ["run", "scenarios/avastra45.ava", "--road", "residential", "--ads", fault, "--episodes", "25"];
+    let found = last_line(&done(&[&run[..], &["--seed", "7", "--format", "json", "--out", &out]].concat()));
+    let kinds = found["left"]["kinds"].as_array().expect("a list");
+    let mut worst: Vec<&str> = kinds.iter().filter_map(|kind| kind["worst"].as_str()).collect();
+    worst.sort_unstable();
+    let critical = found["critical"].as_array().expect("a list").len();
+    assert!(worst.len() >= 2 && worst.len() < critical, "{worst:?} of {critical}");
+    let shrunk = last_line(&done(&["shrink", &out, "--format", "json"]));
+    let shrunk = shrunk["scenarios"].as_array().expect("a list").iter();
+    let mut names: Vec<&str> = shrunk.filter_map(|one| one["scenario"].as_str()).collect();
+    names.sort_unstable();
+    let expected: Vec<String> = worst.iter().map(|name| format!("{name}_shrunk")).collect();
+    assert_eq!(names, expected);
+
+    let folder = scratch.path().display().to_string();
+    fails(&["shrink", &folder], "is no directory of a run: name scenarios");
+}
+
 /// What becomes of these scenarios.
 fn shrunk(found: &[std::path::PathBuf]) -> String {
     let found: Vec<String> = found.iter().map(|path| path.display().to_string()).collect();

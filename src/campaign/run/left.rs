@@ -3,7 +3,7 @@
 //! A *kind* is a pre-crash type without its road, with the modules at fault if these were looked for, or a requirement. A wreck
 //! of another crash and the type "other" are none. A kind is seen in an episode if a finding of it there recurs.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use avastra_base::statistics::unseen;
 
@@ -35,6 +35,9 @@ pub struct SeenKind {
     pub first_h: f64,
     /// The scenario of the first.
     pub scenario: String,
+    /// The scenario that is about the most severe finding of it that recurs: a collision by its harm, a breach by its margin.
+    /// `None` if each scenario with such a finding is about another one.
+    pub worst: Option<String>,
 }
 
 /// The chance that an hour shows a new kind, with a 90 % interval.
@@ -96,21 +99,23 @@ impl Database {
         let place = |episode: i64| settings.map_or((episode as usize, 0), |run| run.turn(episode as usize));
         episodes.sort_unstable_by_key(|(episode, ..)| place(*episode));
         let found = self.kinds_by_episode()?;
-        let mut kinds: BTreeMap<&str, SeenKind> = BTreeMap::new();
+        let mut kinds: BTreeMap<&str, (SeenKind, f64)> = BTreeMap::new();
         let mut simulated_s = 0.0;
         for (episode, road, duration_s) in &episodes {
             simulated_s += duration_s;
-            for kind in found.seen.get(episode).into_iter().flatten() {
-                let seen = kinds.entry(kind).or_insert_with(|| SeenKind {
-                    kind: kind.clone(),
-                    episodes: 0,
-                    first_h: simulated_s / 3600.0,
-                    scenario: scenario_name(road, *episode),
+            let scenario = scenario_name(road, *episode);
+            for (kind, severity) in found.seen.get(episode).into_iter().flatten() {
+                let (seen, most) = kinds.entry(kind).or_insert_with(|| {
+                    let (kind, scenario, first_h) = (kind.clone(), scenario.clone(), simulated_s / 3600.0);
+                    (SeenKind { kind, episodes: 0, first_h, scenario, worst: None }, f64::NEG_INFINITY)
                 });
                 seen.episodes += 1;
+                if let Some(severity) = severity.filter(|severity| severity > most) {
+                    (seen.worst, *most) = (Some(scenario.clone()), severity);
+                }
             }
         }
-        let mut kinds: Vec<SeenKind> = kinds.into_values().collect();
+        let mut kinds: Vec<SeenKind> = kinds.into_values().map(|(kind, _)| kind).collect();
         kinds.sort_by(|one, other| one.first_h.total_cmp(&other.first_h));
         let seen_in = |episodes: u64| kinds.iter().filter(|kind| kind.episodes == episodes).count() as u64;
         let simulated_h = simulated_s / 3600.0;
@@ -133,10 +138,12 @@ impl Database {
 
     /// The kinds of findings that recur, by episode.
     fn kinds_by_episode(&self) -> Result<Found, DatabaseError> {
-        let query =
-            "SELECT episode, precrash_number, precrash, cause, recurred, replays FROM collision WHERE counted
-             UNION ALL SELECT episode, NULL, requirement, NULL, max(recurred), max(replays) FROM breach
-             GROUP BY episode, requirement";
+        // A scenario is about the first of these.
+        let query = "SELECT episode, precrash_number, precrash, cause, recurred, replays, harm_share, 0 AS is_breach, number
+             FROM collision WHERE counted
+             UNION ALL SELECT episode, NULL, requirement, NULL, max(recurred), max(replays), -min(coalesce(margin, 0.0)), 1, min(number)
+             FROM breach GROUP BY episode, requirement
+             ORDER BY episode, is_breach, number";
         let rows = query_all(&self.connection, query, |row| {
             let (number, name): (Option<u32>, String) = (row.get(1)?, row.get(2)?);
             let cause: Option<String> = row.get(3)?;
@@ -150,13 +157,17 @@ impl Database {
             };
             let is_kind = number != PreCrash::Other.number() && kind != PreCrash::Wreck.name();
             let recurrence = from_columns(row.get(4)?, row.get(5)?);
-            Ok((row.get(0)?, is_kind.then_some(kind), recurrence))
+            Ok((row.get(0)?, is_kind.then_some(kind), recurrence, row.get::<_, f64>(6)?))
         })?;
         let mut found = Found::default();
-        for (episode, kind, recurrence) in rows {
+        let mut last: Option<i64> = None;
+        for (episode, kind, recurrence, severity) in rows {
             found.is_untried |= recurrence.is_none();
+            let is_first = last != Some(episode);
+            last = Some(episode);
             if let Some(kind) = kind.filter(|_| recurrence.is_some_and(Recurrence::recurs)) {
-                found.seen.entry(episode).or_default().insert(kind);
+                let seen = found.seen.entry(episode).or_default().entry(kind).or_default();
+                *seen = is_first.then_some(severity).or(*seen);
             }
         }
         Ok(found)
@@ -166,7 +177,8 @@ impl Database {
 /// What recurs in which episode.
 #[derive(Default)]
 struct Found {
-    seen: BTreeMap<i64, BTreeSet<String>>,
+    /// The kinds of an episode, each with its severity if the scenario is about it.
+    seen: BTreeMap<i64, BTreeMap<String, Option<f64>>>,
     /// Whether a finding was never played again.
     is_untried: bool,
 }

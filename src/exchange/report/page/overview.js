@@ -227,7 +227,7 @@ function required({ requirements }, scenarios) {
 /** The kinds of failures that recur, since when each is known, and the chance of another. */
 function kinds({ simulated_h: hours, kinds: found, next_hour: next }, scenarios) {
   if (found.length === 0 && !next) return null;
-  const rows = found.map((of) => [of.kind, figure(of.first_h, "h", 1), String(of.episodes), exampleOf(of, scenarios)]);
+  const rows = found.map((of) => [of.kind, figure(of.first_h, "h", 1), String(of.episodes), exampleOf({ scenario: of.worst ?? of.scenario }, scenarios)]);
   const points = [[0, 0], ...found.map((of, i) => [of.first_h, i + 1]), [hours, found.length]];
   return el(
     "section",
@@ -241,7 +241,7 @@ function kinds({ simulated_h: hours, kinds: found, next_hour: next }, scenarios)
           `(best guess ${next.chance.toFixed(2)}).`,
       ),
     found.length > 0 &&
-      table("In the order in which they were seen first", ["Kind", "First after", "Episodes", "First"], rows),
+      table("In the order in which they were seen first", ["Kind", "First after", "Episodes", "Worst"], rows),
     found.length > 1 && next && curve("Kinds seen so far", points, "simulated hours", 1),
   );
 }
