@@ -1,7 +1,7 @@
 #!/bin/sh
 # Makes the shipped policies again: `sh policies/make.sh`, from the repository's root.
 #
-# One training for each road, with the default preset, against a driving system whose planning yields to nobody: against the
+# One training for each road, with the default preset, against a driving system whose planning never yields: against the
 # default profile there is next to nothing to learn. The same version on any machine writes the same bytes. What was
 # made before is replaced only when all four are there and their claims hold.
 set -eu

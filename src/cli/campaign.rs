@@ -94,9 +94,9 @@ pub trait Cut: Campaign {
         as_they_are(database)
     }
 
-    /// Of the items that are not played, rising, those that are to be played next: all, unless what was found decides how many
+    /// Which of the unplayed items, in rising order, are played next: all of them, unless what was found decides how many
     /// there are.
-    fn next(&self, lacking: Vec<usize>, _: &Self::Database) -> Result<Vec<usize>, DatabaseError> {
+    fn to_play(&self, lacking: Vec<usize>, _: &Self::Database) -> Result<Vec<usize>, DatabaseError> {
         Ok(lacking)
     }
 
@@ -146,13 +146,13 @@ impl Share {
 
     /// Those of its items that are to be played next.
     pub fn lacking<C: Cut>(&self, settings: &C, directory: &Directory<C>) -> Result<Vec<usize>, Failure> {
-        directory.read(|database| self.next(settings, database))
+        directory.read(|database| self.to_play(settings, database))
     }
 
-    fn next<C: Cut>(&self, settings: &C, database: &C::Database) -> Result<Vec<usize>, DatabaseError> {
+    fn to_play<C: Cut>(&self, settings: &C, database: &C::Database) -> Result<Vec<usize>, DatabaseError> {
         let played = settings.numbered(database)?.into_iter().map(|(_, place)| place).collect();
         let lacking = self.own.iter().copied().filter(|&item| !self.work[item].is_in(&played));
-        settings.next(lacking.collect(), database)
+        settings.to_play(lacking.collect(), database)
     }
 
     /// The progress over its episodes. `how` is as for [`Progress`], `lacking` has the items that are not played.
@@ -191,7 +191,7 @@ pub fn missing<C: Cut>(
     let unread = |error| Failure::file("read", &C::KIND.database(directory), error);
     let played = settings.numbered(database).map_err(unread)?;
     let played: BTreeSet<i64> = played.into_iter().map(|(_, place)| place).collect();
-    let lacking = share.next(settings, database).map_err(unread)?;
+    let lacking = share.to_play(settings, database).map_err(unread)?;
     let lacking = lacking.iter().flat_map(|&item| share.work[item].units.clone());
     let lacking: BTreeSet<i64> = lacking.filter(|unit| is_wanted(*unit) && !played.contains(unit)).collect();
     let there = share.own.iter().flat_map(|&item| share.work[item].units.clone());

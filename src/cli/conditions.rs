@@ -46,6 +46,10 @@ pub fn as_trained(
     space: &Space,
 ) -> Result<(), Failure> {
     let origin = &policy.origin;
+    let is_known = |name: &str| {
+        space.rules.iter().any(|rule| rule.name == name)
+            || space.requirements.iter().any(|of| of.name == name)
+    };
     let is_here = |name: &String| space.roads.iter().any(|road| road.name == *name);
     if arguments.road.is_empty() && origin.roads.iter().all(is_here) {
         conditions.roads.clone_from(&origin.roads);
@@ -59,7 +63,9 @@ pub fn as_trained(
         (&mut conditions.with, &origin.with, &arguments.rules.without),
         (&mut conditions.without, &origin.without, &arguments.rules.with),
     ] {
-        let more = trained.iter().filter(|rule| !rules.contains(rule) && !others.contains(rule));
+        // Another space may lack a rule. That it is not in force is told with all that is otherwise than in the training.
+        let more =
+            trained.iter().filter(|rule| !rules.contains(rule) && !others.contains(rule) && is_known(rule));
         let more: Vec<String> = more.cloned().collect();
         rules.extend(more);
     }

@@ -326,11 +326,14 @@ fn missing_of_training(
     // A training by time has as many episodes as it took; it is done if it has results.
     let is_done = database.results().map_err(unread)?.is_some();
     let there = database.episodes().map_err(unread)?;
-    let wanted = match training.hours {
-        Some(_) if is_done => there.len(),
-        Some(_) => there.len() + 1,
-        None => training.episodes as usize,
-    };
+    if training.hours.is_some() && !is_done {
+        let directory = for_shell(directory);
+        return Ok(Some(format!(
+            "the training is not finished: `avastra train --resume {directory}` goes on with it"
+        )));
+    }
+    let judged = training.evaluation as usize * training.conditions.roads.len();
+    let wanted = if training.hours.is_some() { there.len() } else { training.episodes as usize + judged };
     let lacking = wanted.saturating_sub(there.len());
     let is_gap = there.last().is_some_and(|&last| last >= there.len());
     Ok(match is_gap {

@@ -82,7 +82,7 @@ impl Cut for RunSettings {
     }
 
     /// With a budget, those of the block under way, or of the next one.
-    fn next(&self, mut lacking: Vec<usize>, database: &Database) -> Result<Vec<usize>, DatabaseError> {
+    fn to_play(&self, mut lacking: Vec<usize>, database: &Database) -> Result<Vec<usize>, DatabaseError> {
         let (Some(budget), Some(&first)) = (&self.budget, lacking.first()) else { return Ok(lacking) };
         let block = self.block();
         if first.is_multiple_of(block) && first > 0 && database.is_spent(self, budget)? {
@@ -287,7 +287,10 @@ fn play_all(
         output.say(&requirements_text(&requirements));
     }
     let left = directory.read(|database| database.left(Some(run.settings())))?;
-    left.in_words().iter().for_each(|text| output.say(text));
+    output.say(&left.in_words());
+    if run.settings().budget.is_some_and(|budget| budget.until.is_some()) && left.next_hour.is_none() {
+        output.warn("`--until` could not end it: a finding was not played again, so nothing is known of the next hour");
+    }
     let is_protocol = run.settings().rows > 0;
     let tests = match is_protocol {
         true => directory.read(|database| database.tests(Some(run.space())))?,
@@ -377,7 +380,15 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<Option<Begun>, Fai
     };
     let settings = match arguments.hours {
         None => settings,
-        Some(hours) if shard.is_whole() => settings.within(Budget { hours, until: arguments.until }),
+        Some(hours) if shard.is_whole() => {
+            let budget = Budget { hours, until: arguments.until };
+            if let Some(until) = arguments.until.filter(|_| hours > 0.0 && !budget.can_end_sooner()) {
+                output.warn(&format!(
+                    "{hours} h are too few for `--until {until}`: even if nothing is found, the chance is below that only later"
+                ));
+            }
+            settings.within(budget)
+        }
         Some(_) => {
             return Err(Failure::usage(
                 "a run with `--hours` is one piece: give each machine a `--seed` of its own, or `--episodes` and shards",

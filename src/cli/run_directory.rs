@@ -372,7 +372,9 @@ pub fn worst_of_each_kind(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
     let found: Vec<PathBuf> =
         written.into_iter().map(|(path, _)| path).filter(|path| is_worst(path)).collect();
     if found.is_empty() {
-        return Err(Failure::usage(format!("nothing recurs in `{shown}`: name scenarios")));
+        return Err(Failure::usage(format!(
+            "no scenario of `{shown}` is about a finding that recurs: name scenarios"
+        )));
     }
     Ok(found)
 }

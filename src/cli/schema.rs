@@ -143,8 +143,8 @@ ads schema
   protocol object the JSON Schema of every message
 train
   directory text the run directory
-  totals object as in `run`
-  groups[] object a distinct failure of the training, as in `run`
+  totals object as in `run`, of the training alone
+  groups[] object a distinct failure of the training and its evaluation, as in `run`
   requirements[] object a requirement in force, as in `run`; careful drivers are tried in the first episode of each
   left object the kinds that recur, as in `run`, those of the evaluation included; its `next_hour` is always null
   simulated_h number time driven

@@ -179,7 +179,7 @@ fn keep(
     let TrainSettings { agent, conditions, .. } = settings;
     let player = Player { command: "train", table: training.table(), agent, conditions };
     directory.write_failure(&player, (&trained.log, &trained.summary))?;
-    let scenario = has_scenario(training, &trained.log, &trained.summary)
+    let scenario = is_written(training, &trained.log, &trained.summary)
         .then(|| directory.write_critical(&player, (&training.log_of_space(&trained.log), &trained.summary)));
     let scenario = scenario.transpose()?;
     let is_due = training.episodes().is_multiple_of(CHECKPOINT_EPISODES)
@@ -196,7 +196,7 @@ fn keep(
 
 /// Whether an episode becomes a scenario. Where a training sets its observation period, none does, because a replay would use the
 /// period of the space.
-fn has_scenario(training: &Training, log: &EpisodeLog, summary: &EpisodeSummary) -> bool {
+fn is_written(training: &Training, log: &EpisodeLog, summary: &EpisodeSummary) -> bool {
     let is_critical = summary.counted() > 0 || !log.breaches.is_empty();
     is_critical && training.settings().hyperparameters.observation_period_s().is_none()
 }
@@ -209,9 +209,9 @@ fn evaluated(training: &Training, directory: &mut Directory) -> Result<Evaluatio
     let mut kept = Ok(());
     let mut keep = |mut summary: EpisodeSummary, log: &EpisodeLog| -> Result<(), Failure> {
         summary.episode += training.episodes();
-        let has_scenario = has_scenario(training, log, &summary);
-        let scenario =
-            has_scenario.then(|| directory.write_critical(&player, (log, &summary))).transpose()?;
+        let scenario = is_written(training, log, &summary)
+            .then(|| directory.write_critical(&player, (log, &summary)))
+            .transpose()?;
         directory.write_failure(&player, (log, &summary))?;
         let space = training.table().space();
         directory.write(|database| database.add(&summary, log, space, in_words, scenario.as_deref()))

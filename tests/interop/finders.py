@@ -1,7 +1,7 @@
 """What each finder finds in the same simulated time, everything charged: `finders.py AVASTRA CELLS [--hours H] [--repeats N] [--drivers NAME,…]`.
 
 Each finder searches a space for so many simulated hours against each driving system, in independent repetitions (seeds 1 to N). What it finds while it
-learns counts; nothing is played after it. A cell is the number of kinds of failures that recur, and the processor time with all judging and replays.
+learns counts; nothing is played after it. A run ends after whole rounds, so it plays some minutes more. A cell is the number of kinds of failures that recur, and the processor time with all judging and replays.
 CELLS is a file of JSON lines: cells that it has, under the same engine, are not played again. The tables are printed in Markdown.
 """
 
@@ -56,7 +56,7 @@ def played(avastra, driver, finder, seed, hours):
         found = json.loads(done.stdout.splitlines()[-1])
     return {
         "driver": driver, "finder": finder, "seed": seed, "hours": hours,
-        "kinds": sorted(kind["kind"] for kind in found["left"]["kinds"]),
+        "kinds": sorted(kind["kind"] for kind in found["left"]["kinds"]), "simulated_h": round(found["left"]["simulated_h"], 3),
         "counted": found["totals"]["counted"], "episodes": found["totals"]["episodes"],
         "cpu_s": round(used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime, 1),
     }
@@ -136,12 +136,14 @@ def main():
     options = parser.parse_args()
     engine = re.search(r"\w+/\d+", subprocess.run([options.avastra, "--version"], check=True, capture_output=True, text=True).stdout)[0]
     known = [json.loads(line) for line in options.cells.read_text().splitlines()] if options.cells.exists() else []
-    cells = {(cell["driver"], cell["finder"], cell["seed"]): cell for cell in known if (cell["engine"], cell["hours"]) == (engine, options.hours)}
+    is_asked = lambda cell: (cell["engine"], cell["hours"]) == (engine, options.hours)  # noqa: E731
+    others = [cell for cell in known if not is_asked(cell)]
+    cells = {(cell["driver"], cell["finder"], cell["seed"]): cell for cell in known if is_asked(cell)}
     wanted = itertools.product(range(1, options.repeats + 1), options.drivers.split(","), FINDERS)
     for seed, driver, finder in wanted:
         if (driver, finder, seed) not in cells:
             cells[driver, finder, seed] = {"engine": engine, **played(os.path.abspath(options.avastra), driver, finder, seed, options.hours)}
-            options.cells.write_text("".join(json.dumps(cell) + "\n" for cell in cells.values()))
+            options.cells.write_text("".join(json.dumps(cell) + "\n" for cell in [*others, *cells.values()]))
     print(table(cells.values()))
 
 

@@ -1,8 +1,8 @@
 """Whether a run says the truth about its next hour: `next_hour.py AVASTRA OUT [HOURS]`.
 
-Plays a long campaign of random episodes against each of three driving systems (100 simulated hours by default, 10 minutes of a processor for all) and
+Plays a long campaign of random episodes against each of three driving systems (100 simulated hours by default, 15 minutes of a processor for all) and
 cuts each into windows. From a window alone follows the interval of the chance that an hour shows a new kind, by the formula of
-`base::statistics::unseen`, written here once more. The truth is the share of the other hours of the campaign that show a kind which the window has not.
+`base::statistics::unseen`, written here once more. A kind is one without a cause. The truth is the share of the other hours of the campaign that show a kind which the window has not.
 Then `--until` is tried: each campaign is begun at 40 places, and stops there by its rule. Campaigns in OUT are not played again.
 """
 
@@ -25,6 +25,8 @@ CAMPAIGNS = {
 WINDOWS_H = (1, 2, 5, 10)
 UNTIL = (0.5, 0.3)
 PLACES = 40
+#: Episodes between two looks: four rounds of four roads.
+BLOCK = 16
 
 
 def bisect(low, high, is_above):
@@ -96,7 +98,7 @@ def stopped(all_episodes, first, until):
     for number, (hours, kinds) in enumerate(all_episodes[first:], 1):
         passed += hours
         seen.update(kinds)
-        if number % 16 == 0 and next_hour(seen, passed)[1] <= until:
+        if number % BLOCK == 0 and next_hour(seen, passed)[1] <= until:
             return passed, set(seen)
     return None
 
@@ -125,7 +127,7 @@ def main():
             held, all_windows = held + covered, all_windows + count
         for until in UNTIL:
             kept, ends = 0, []
-            for first in range(0, len(played) // 2, len(played) // 2 // PLACES):
+            for first in (len(played) // 2 * place // PLACES for place in range(PLACES)):
                 end = stopped(played, first, until)
                 if end:
                     begun = sum(hours for hours, _ in played[:first])

@@ -334,6 +334,8 @@ fn a_run_by_time_is_the_same_with_any_threads_and_kills() {
         (&["--hours", "0"][..], "the budget is 0 h"),
         (&["--hours", "NaN"], "the budget is NaN h"),
         (&["--hours", "1", "--until", "1"], "the budget is 1 h, until 1"),
+        (&["--hours", "1", "--until", "0.5", "--repeat", "6"], "`--until` asks what recurs"),
+        (&["--hours", "1001"], "hours above 0 up to 1000 are possible"),
         (&["--hours", "1", "--agent", "every-row"], "`--hours` is for other agents"),
         (&["--hours", "1", "--shard", "1/2"], "a run with `--hours` is one piece"),
     ] {

@@ -157,7 +157,61 @@ fn scenarios_of_a_training_that_are_gone_or_edited_are_noticed() {
     assert!(index["overview"]["evaluation"].is_null());
 }
 
-/// A training by time ends where it would with no kill, keeps what its evaluation found, and names the kinds that recur.
+/// How much of a training by time is over decides how it explores. So it must be the same to the bit after a kill, in the training
+/// and in its evaluation.
+#[test]
+fn a_training_by_time_goes_on_to_the_same_bytes() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let config = scratch.path().join("small.yaml");
+    std::fs::write(&config, format!("{SMALL}exploration_share: 0.9\n")).expect("it is writable");
+    let train = |out: &Path| {
+        let words =
+            ["train", "scenarios/avastra45.ava", "--road", "corner", "--hours", "0.6", "--evaluate", "4"];
+        let (config, out) = (config.display().to_string(), out.display().to_string());
+        done(&[&words[..], &["--seed", "5", "--config", &config, "--out", &out]].concat());
+    };
+    let (whole, cut) = (scratch.path().join("whole"), scratch.path().join("cut"));
+    train(&whole);
+    let bytes = |out: &Path| std::fs::read(out.join("run.db")).expect("it is readable");
+    let database = rusqlite::Connection::open(whole.join("run.db")).expect("a database");
+    let learned: i64 =
+        database.query_row("SELECT count(*) FROM learning", [], |row| row.get(0)).expect("a number");
+    assert!(learned > 26, "a checkpoint is kept after 25 episodes: {learned}");
+    train(&cut);
+    let file = cut.join("run.db");
+    let tables =
+        ["step", "collision", "breach", "margin", "scenario", "offer", "held", "failure", "learning"];
+    // A kill in the evaluation leaves a part of it, and no results.
+    let delete = |from: i64| -> String {
+        let of_table = |table: &str| format!("DELETE FROM {table} WHERE episode >= {from};");
+        tables.into_iter().chain(["episode"]).map(of_table).collect::<String>()
+            + &format!("DELETE FROM seal WHERE unit >= {from}; DELETE FROM result;")
+    };
+    change(&file, &delete(learned + 2));
+    done(&["train", "--resume", &cut.display().to_string()]);
+    assert!(bytes(&whole) == bytes(&cut), "a kill in the evaluation");
+    // The kills of `killed` end it at any moment.
+    let killed_out = scratch.path().join("killed");
+    let words = [
+        "train",
+        "scenarios/avastra45.ava",
+        "--road",
+        "corner",
+        "--hours",
+        "0.6",
+        "--evaluate",
+        "4",
+        "--seed",
+        "5",
+    ];
+    let config = config.display().to_string();
+    let more = ["--config".to_owned(), config, "--out".to_owned(), killed_out.display().to_string()];
+    let arguments: Vec<String> = words.into_iter().map(str::to_owned).chain(more).collect();
+    killed(&arguments, &killed_out, [300, 600, 900]);
+    assert!(bytes(&whole) == bytes(&killed_out), "kills in the training");
+}
+
+/// A training by time keeps what its evaluation found, and names the kinds that recur.
 #[test]
 fn a_training_by_time_keeps_all_that_it_finds() {
     let scratch = tempfile::tempdir().expect("a scratch directory");

@@ -262,18 +262,18 @@ fn poisson_far(count: u64) -> f64 {
     count as f64 + 10.0 * (count as f64).sqrt() + 20.0
 }
 
-/// How many events of kinds that were not seen yet as long a time again brings, by the numbers of kinds that were seen once and
-/// twice so far: the guess of Good and Turing (Good 1953), and an interval that holds in 90 of 100 campaigns.
+/// The interval of the expected number of events, of kinds that were not seen yet, in as long a time again. `once` kinds were
+/// seen once so far, and `twice` were seen twice. It held in at least 90 % of simulated campaigns.
 ///
-/// The error of the guess has the variance `once + 2 * twice` (Robbins 1968). With few kinds it is skewed. So the upper end is
+/// The best guess is `once` (Good 1953). Its error has the variance `once + 2 * twice` (Robbins 1968). With few kinds it is skewed. So the upper end is
 /// that of a Poisson mean, with its distance from the guess widened by the ratio of the two standard deviations.
-pub fn unseen(once: u64, twice: u64) -> (f64, Interval) {
+pub fn unseen(once: u64, twice: u64) -> Interval {
     const Z_OF_90: f64 = 1.644_853_626_951_472;
     let guess = once as f64;
     let variance = guess + 2.0 * twice as f64 + 1.0;
     let low = (guess - Z_OF_90 * variance.sqrt()).max(0.0);
     let high = guess + (poisson_above(once, 0.05) - guess) * (variance / (guess + 1.0)).sqrt();
-    (guess, Interval { low, high: Some(high) })
+    Interval { low, high: Some(high) }
 }
 
 /// Probability that a Poisson variable is at most `count`.
@@ -471,12 +471,14 @@ mod tests {
                         _ => {}
                     }
                 }
-                let (_, found) = unseen(once, twice);
+                let found = unseen(once, twice);
                 covered += u32::from((found.low..=found.high.unwrap()).contains(&left));
             }
             assert!(covered >= 900, "{hours} h: {covered}");
         }
-        assert_near(unseen(0, 0).1, [0.0, 2.995_732_273_553_991], 1e-9);
+        assert_near(unseen(0, 0), [0.0, 2.995_732_273_553_991], 1e-9);
+        // 4.743865 is Garwood's end for one, √3 the ratio of the deviations.
+        assert_near(unseen(1, 2), [0.0, 1.0 + 3.743_864_518 * 3.0_f64.sqrt()], 1e-6);
     }
 
     /// The number of unit steps of an exponential clock that fit into `mean`.

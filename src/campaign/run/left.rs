@@ -1,7 +1,7 @@
 //! What a run has found, kind by kind, and what is left: the chance that an hour more shows a kind that it has not seen.
 //!
 //! A *kind* is a pre-crash type without its road, with the modules at fault if these were looked for, or a requirement. A wreck
-//! of another crash and the type "other" are none. A kind is seen in an episode if a finding of it there recurs.
+//! of another crash and the type "other" are not kinds. A kind is seen in an episode if a finding of it there recurs.
 
 use std::collections::BTreeMap;
 
@@ -50,12 +50,12 @@ pub struct NextHour {
 
 impl NextHour {
     /// From the numbers of kinds that were seen in one episode, and in two, in so many hours.
-    fn after(hours: f64, once: u64, twice: u64) -> NextHour {
+    pub(super) fn after(hours: f64, once: u64, twice: u64) -> NextHour {
         // New kinds come as a Poisson process.
         let chance = |expected: f64| -libm::expm1(-expected / hours);
-        let (guess, interval) = unseen(once, twice);
+        let interval = unseen(once, twice);
         let high = interval.high.map_or(1.0, chance);
-        NextHour { chance: chance(guess), low: chance(interval.low), high }
+        NextHour { chance: chance(once as f64), low: chance(interval.low), high }
     }
 }
 
@@ -71,17 +71,19 @@ impl Left {
     }
 
     /// For the terminal: how many kinds recur, since when, and the chance of a new one.
-    pub fn in_words(&self) -> Option<String> {
-        let NextHour { chance, high, .. } = self.next_hour?;
+    pub fn in_words(&self) -> String {
         let since = match self.kinds.as_slice() {
             [] => String::new(),
             [only] => format!(", first seen after {:.1} h", only.first_h),
             [.., newest] => format!(", the newest first seen after {:.1} h", newest.first_h),
         };
-        Some(format!(
-            "{}{since}\nthe chance that an hour more shows a new kind is at most {high:.2} (best guess {chance:.2})",
-            self.kinds_text()
-        ))
+        let kinds = self.kinds_text() + &since;
+        let Some(NextHour { chance, high, .. }) = self.next_hour else { return kinds };
+        // What is "at most" is rounded up.
+        let high = (100.0 * high).ceil() / 100.0;
+        format!(
+            "{kinds}\nthe chance that an hour more shows a new kind is at most {high:.2} (best guess {chance:.2})"
+        )
     }
 }
 
@@ -119,8 +121,15 @@ impl Database {
         kinds.sort_by(|one, other| one.first_h.total_cmp(&other.first_h));
         let seen_in = |episodes: u64| kinds.iter().filter(|kind| kind.episodes == episodes).count() as u64;
         let simulated_h = simulated_s / 3600.0;
-        let is_by_chance = settings.is_some_and(|run| run.rows == 0 && can_tell(run.replays));
-        let is_known = is_by_chance && !found.is_untried;
+        let is_told = settings.is_some_and(|run| {
+            let on = |road: &String| episodes.iter().filter(|(_, one, _)| one == road).count();
+            let counts: Vec<usize> = run.conditions.roads.iter().map(on).collect();
+            // An hour more drives all roads alike: what was driven of one alone says nothing of it.
+            let is_even =
+                counts.iter().max().zip(counts.iter().min()).is_some_and(|(most, least)| most - least <= 1);
+            run.rows == 0 && can_tell(run.replays) && is_even
+        });
+        let is_known = is_told && !found.is_untried;
         let next_hour =
             (is_known && simulated_h > 0.0).then(|| NextHour::after(simulated_h, seen_in(1), seen_in(2)));
         Ok(Left { simulated_h, kinds, next_hour })

@@ -72,8 +72,12 @@ impl Run {
     }
 
     fn with_agent(table: ActionTable, settings: RunSettings, agent: Box<MakeAgent>) -> Result<Run, RunError> {
-        check_episodes(settings.episodes)?;
         settings.budget.as_ref().map_or(Ok(()), Budget::check)?;
+        if settings.budget.is_some_and(|budget| budget.until.is_some()) && !oracle::can_tell(settings.replays)
+        {
+            return Err(RunError::UntilUntold);
+        }
+        check_episodes(settings.episodes)?;
         if settings.avoidability != AvoidabilitySettings::default() {
             return Err(RunError::Avoidability);
         }

@@ -9,6 +9,7 @@ use avastra_lang::syntax::{listed, nearest, read_yaml};
 use avastra_search::agent;
 use avastra_world::sim::{ENGINE, TrafficError};
 
+use crate::run::left::NextHour;
 use crate::run::profile::{DEFAULT_ADS, Profile, TrafficRecord};
 
 /// Version of avastra, as settings record it.
@@ -128,6 +129,11 @@ impl Budget {
     /// Longest budget, h.
     pub const HOURS_MAX: f64 = 1000.0;
 
+    /// Whether `until` can end it before its hours are over: a chance is small only after some hours, even if nothing is found.
+    pub fn can_end_sooner(&self) -> bool {
+        self.until.is_none_or(|until| NextHour::after(self.hours, 0, 0).high <= until)
+    }
+
     /// Whether it is possible.
     pub(crate) fn check(&self) -> Result<(), RunError> {
         let fits = self.hours > 0.0
@@ -143,12 +149,13 @@ impl Budget {
     /// The most episodes that it can pay for on one of so many roads: hardly any is shorter than this.
     pub fn episodes(&self, roads: usize) -> u32 {
         const SHORT_S: f64 = 4.0;
-        ((self.hours * 3600.0 / SHORT_S / roads as f64).ceil() as u32).max(ROUNDS as u32)
+        ((self.hours * 3600.0 / SHORT_S / roads as f64).ceil() as u32).max(EPISODES as u32)
     }
 }
 
-/// Rounds of the roads between two looks at a budget. Ours: some minutes.
+/// Rounds of the roads between two looks at a budget, and the fewest episodes. Ours: some minutes, and work for many threads.
 const ROUNDS: usize = 4;
+const EPISODES: usize = 16;
 
 fn is_zero(count: &u32) -> bool {
     *count == 0
@@ -176,7 +183,8 @@ impl RunSettings {
 
     /// Episodes between two looks at a budget.
     pub fn block(&self) -> usize {
-        ROUNDS * self.conditions.roads.len()
+        let roads = self.conditions.roads.len();
+        roads * ROUNDS.max(EPISODES.div_ceil(roads))
     }
 
     /// The same settings with a budget in place of a number of episodes.
@@ -244,8 +252,13 @@ pub enum RunError {
     Time(#[from] avastra_lang::prove::BrokenByTime),
     #[error("`{name}` is asked for twice, or both on and off")]
     Twice { name: String },
-    #[error("the budget is {found}: hours above 0 up to 1000 are possible, and a chance above 0 and below 1")]
+    #[error(
+        "the budget is {found}: hours above 0 up to {} are possible, and a chance above 0 and below 1",
+        Budget::HOURS_MAX
+    )]
     Budget { found: String },
+    #[error("`--until` asks what recurs, which takes at least 7 replays: leave out `--repeat`, or raise it")]
+    UntilUntold,
     #[error("`{name}` plays each row so many times, whatever time that takes: `--hours` is for other agents")]
     BudgetOfRows { name: String },
     #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]

@@ -5,7 +5,7 @@
 
 use rusqlite::{OptionalExtension, params};
 
-use crate::run::{Database, DatabaseError, LAYOUT, add_all, insert_row, settings_digest};
+use crate::run::{Database, DatabaseError, LAYOUT, add_all, insert_row, query_all, settings_digest};
 use avastra_lang::model::{Space, digest};
 use avastra_world::action::Draw;
 
@@ -93,8 +93,11 @@ impl Database {
     /// # Errors
     /// If the file cannot be read.
     pub fn trained_s(&self) -> Result<f64, DatabaseError> {
-        let sum = "SELECT coalesce(sum(simulated_s), 0.0) FROM learning";
-        Ok(self.connection.query_row(sum, [], |row| row.get(0))?)
+        // Summed as a training does it: SQLite's own sum rounds otherwise, and what is left of a training follows from it.
+        let all = query_all(&self.connection, "SELECT simulated_s FROM learning ORDER BY episode", |row| {
+            row.get::<_, f64>(0)
+        })?;
+        Ok(all.into_iter().fold(0.0, |sum, one| sum + one))
     }
 
     /// Returns the last checkpoint and deletes all episodes after it. Without a checkpoint, all episodes are

@@ -266,8 +266,8 @@ fn experiences(
 
 /// Looks everything up that the settings name.
 fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<Rows>), RunError> {
-    check_episodes(settings.episodes)?;
     settings.hours.map_or(Ok(()), |hours| Budget { hours, until: None }.check())?;
+    check_episodes(settings.episodes)?;
     if matches!(agent_named(&settings.agent)?.kind, Kind::Ready(_) | Kind::OneRow(_)) {
         return Err(RunError::Unteachable { name: settings.agent.clone() });
     }

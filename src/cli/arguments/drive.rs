@@ -65,7 +65,7 @@ pub struct RunArguments {
     pub ads: Option<String>,
     #[command(flatten)]
     pub conditions: ConditionArguments,
-    /// Let a trained policy choose them. It plays as it was trained: on its space and roads, against its driving system and
+    /// Let a trained policy choose the actions. It plays as it was trained: on its space and roads, against its driving system and
     /// traffic, with its rules. What you name takes their place.
     #[arg(long, value_name = "POLICY", conflicts_with = "agent")]
     pub policy: Option<PathBuf>,
@@ -75,10 +75,12 @@ pub struct RunArguments {
     /// Episodes on each road, of `every-row` of each row on each [default: 100, of `every-row` 1].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(avastra_campaign::run::EPISODES_MAX)))]
     pub episodes: Option<u32>,
-    /// Play for so many simulated hours in place of a number of episodes; they go round the roads.
+    /// Play for this much simulated time, in hours, in place of a number of episodes. The roads are driven by turns, and it ends after
+    /// four rounds, or eight, and so on.
     #[arg(long, value_name = "H", conflicts_with_all = ["episodes", "dry_run"])]
     pub hours: Option<f64>,
-    /// Stop sooner, once an hour more shows a new kind of failure with at most this chance, by the upper end of its interval.
+    /// Stop sooner: once the chance that an hour more shows a new kind of failure is at most this, by the upper end of its
+    /// 90 % interval.
     #[arg(long, value_name = "CHANCE", requires = "hours")]
     pub until: Option<f64>,
     /// Say of each counted collision which module of the driving system is at fault; takes some twenty

@@ -10,8 +10,8 @@ use crate::cli::help::Named;
 
 #[derive(Debug, Clone, Args)]
 pub struct FilesArguments {
-    /// Scenarios, as `avastra run` writes them; `replay` and `export --to ava` take policies, too, and `shrink` the directory of a
-    /// run, of which it takes the worst finding of each kind that recurs.
+    /// Scenarios, as `avastra run` writes them; `replay` and `export --to ava` take policies, too; `shrink` takes the directory of a
+    /// run: the worst finding of each kind that recurs.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
     /// Worker threads over files [default: one for each core].

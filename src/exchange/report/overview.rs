@@ -27,12 +27,10 @@ pub fn of_run(
     let rows = table.map(|table| table.rows().iter().map(|row| row.label.as_str()).collect::<Vec<_>>());
     let learning = database.learning()?;
     let totals = database.totals()?;
-    // A training simulates branches too, and returns to moments without playing up to them again.
-    let simulated_s = if learning.is_empty() { totals.simulated_s } else { database.trained_s()? };
     Ok(json!({
         "heat": heat,
         "kind": if learning.is_empty() { "run" } else { "training" },
-        "settings": settings, "conditions": conditions(settings), "totals": totals, "simulated_h": simulated_s / 3600.0,
+        "settings": settings, "conditions": conditions(settings), "simulated_h": totals.simulated_s / 3600.0, "totals": totals,
         "requirements": requirements(database, table)?, "mixed": mixed(settings),
         "groups": database.groups()?, "left": database.left(read_yaml(settings).ok().as_ref())?, "refusals": database.refusals()?, "failures": database.failures()?,
         "rows": rows, "coverage": database.coverage()?, "learning": learning,

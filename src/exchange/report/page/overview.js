@@ -227,8 +227,20 @@ function required({ requirements }, scenarios) {
 /** The kinds of failures that recur, since when each is known, and the chance of another. */
 function kinds({ simulated_h: hours, kinds: found, next_hour: next }, scenarios) {
   if (found.length === 0 && !next) return null;
-  const rows = found.map((of) => [of.kind, figure(of.first_h, "h", 1), String(of.episodes), exampleOf({ scenario: of.worst ?? of.scenario }, scenarios)]);
-  const points = [[0, 0], ...found.map((of, i) => [of.first_h, i + 1]), [hours, found.length]];
+  const rows = found.map((of) => [
+    of.kind,
+    figure(of.first_h, "h", 1),
+    String(of.episodes),
+    exampleOf({ scenario: of.worst }, scenarios),
+  ]);
+  const points = [
+    [0, 0],
+    ...found.flatMap((of, i) => [
+      [of.first_h, i],
+      [of.first_h, i + 1],
+    ]),
+    [hours, found.length],
+  ];
   return el(
     "section",
     { "aria-labelledby": "h-kinds", id: "kinds" },
@@ -237,7 +249,7 @@ function kinds({ simulated_h: hours, kinds: found, next_hour: next }, scenarios)
       el(
         "p",
         { class: "lead" },
-        `The chance that an hour more shows a new kind is at most ${next.high.toFixed(2)} ` +
+        `The chance that an hour more shows a new kind is at most ${(Math.ceil(100 * next.high) / 100).toFixed(2)} ` +
           `(best guess ${next.chance.toFixed(2)}).`,
       ),
     found.length > 0 &&
