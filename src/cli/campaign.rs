@@ -100,6 +100,11 @@ pub trait Cut: Campaign {
         Ok(lacking)
     }
 
+    /// Whether it cannot be cut at all.
+    fn is_one_piece(&self) -> bool {
+        false
+    }
+
     /// Takes over what a shard keeps beside its database.
     fn take_beside(_: [&Path; 2]) -> Result<(), Failure> {
         Ok(())

@@ -1,8 +1,7 @@
 //! The settings of episodes that a command line asks for: who drives, where, under which conditions.
 
-use avastra_campaign::run::{self, Conditions, Profile, Run, RunError, RunSettings, TrafficRecord};
+use avastra_campaign::run::{self, Conditions, Profile, Run, RunSettings, TrafficRecord};
 use avastra_lang::model::{Policy, Space};
-use avastra_world::sim::TrafficProfile;
 
 use super::arguments::ConditionArguments;
 use super::error::Failure;
@@ -54,10 +53,8 @@ pub fn as_trained(
     if arguments.road.is_empty() && origin.roads.iter().all(is_here) {
         conditions.roads.clone_from(&origin.roads);
     }
-    if let (None, Some(traffic)) = (&arguments.traffic, &origin.traffic) {
-        let profile = TrafficProfile::shipped(traffic).or_else(|_| TrafficProfile::from_yaml(traffic));
-        let profile = profile.map_err(|error| RunError::Traffic { name: policy.name.clone(), error })?;
-        conditions.traffic = TrafficRecord::new(&profile);
+    if arguments.traffic.is_none() {
+        conditions.traffic = TrafficRecord::new(&run::trained_in(policy)?);
     }
     for (rules, trained, others) in [
         (&mut conditions.with, &origin.with, &arguments.rules.without),

@@ -199,6 +199,12 @@ impl Survey {
                     None => return Err(failure),
                 }
             }
+            if played.settings.is_one_piece() {
+                let path = path.shown();
+                return Err(Failure::usage(format!(
+                    "`{path}` is one piece, because it ends by time: there is nothing to merge"
+                )));
+            }
             let text = played.text();
             let (first, _) = wanted.get_or_insert_with(|| (text.clone(), played.settings.work()));
             if let Some(what) = settings_differences(first, &text) {

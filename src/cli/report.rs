@@ -241,7 +241,8 @@ fn of_run(
     remarks.extend(match run_directory::is_training(directory) {
         Some(true) if !is_changed => missing_of_training(directory, settings, &database)?,
         Some(false) => match read_yaml::<RunSettings>(settings) {
-            Ok(run) => missing(directory, &run, &database, |_| true)?,
+            Ok(run) => missing(directory, &run, &database, |_| true)?
+                .map(|text| if run.budget.is_some() { unfinished_text("run", directory) } else { text }),
             // The work that settings of another version ask for is not known.
             Err(_) => None,
         },
@@ -315,6 +316,12 @@ fn maps(asked: &[String], tests: &[ProtocolTest], is_protocol: bool) -> Result<V
     Ok(found)
 }
 
+/// Says that what a command began is not played to the end, where nothing tells how much is left.
+fn unfinished_text(command: &str, directory: &Path) -> String {
+    let directory = for_shell(directory);
+    format!("it is not played to the end: `avastra {command} --resume {directory}` goes on with it")
+}
+
 /// Says how many episodes a training lacks. If later ones are there, they learned from it, so it cannot be gone on with.
 fn missing_of_training(
     directory: &Path,
@@ -324,14 +331,8 @@ fn missing_of_training(
     let Ok(training) = read_yaml::<TrainSettings>(settings) else { return Ok(None) };
     let unread = |error| Failure::file("read", &directory.join("run.db"), error);
     // A training by time has as many episodes as it took; it is done if it has results.
-    let is_done = database.results().map_err(unread)?.is_some();
+    let is_done = matches!(database.results(), Ok(Some(_)) | Err(DatabaseError::Results));
     let there = database.episodes().map_err(unread)?;
-    if training.hours.is_some() && !is_done {
-        let directory = for_shell(directory);
-        return Ok(Some(format!(
-            "the training is not finished: `avastra train --resume {directory}` goes on with it"
-        )));
-    }
     let judged = training.evaluation as usize * training.conditions.roads.len();
     let wanted = if training.hours.is_some() { there.len() } else { training.episodes as usize + judged };
     let lacking = wanted.saturating_sub(there.len());
@@ -341,6 +342,7 @@ fn missing_of_training(
             "{lacking} of {} missing, and later ones learned from what is missing: begin a new training",
             plural(wanted, "episode")
         )),
+        false if lacking == 0 && !is_done => Some(unfinished_text("train", directory)),
         false => lacks::<TrainSettings>(directory, lacking, wanted),
     })
 }

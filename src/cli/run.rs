@@ -96,6 +96,10 @@ impl Cut for RunSettings {
         Ok(database.episodes()?.into_iter().map(|number| (number as i64, number as i64)).collect())
     }
 
+    fn is_one_piece(&self) -> bool {
+        self.budget.is_some()
+    }
+
     fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
         let (begun, _) = resumed(output, directory, true)?;
         play_all(output, begun, None, None).map(drop)
@@ -288,8 +292,16 @@ fn play_all(
     }
     let left = directory.read(|database| database.left(Some(run.settings())))?;
     output.say(&left.in_words());
-    if run.settings().budget.is_some_and(|budget| budget.until.is_some()) && left.next_hour.is_none() {
-        output.warn("`--until` could not end it: a finding was not played again, so nothing is known of the next hour");
+    if let Some(Budget { hours, until }) = run.settings().budget.filter(|_| is_over) {
+        if until.is_some() && left.next_hour.is_none() {
+            output.warn("`--until` could not end it: nothing is known of the next hour, because a finding was not played again or an \
+                         episode was not driven to its end");
+        } else if left.simulated_h < hours && until.is_none() {
+            output.warn(&format!(
+                "only {:.1} h of {hours} h were simulated: the episodes are too short",
+                left.simulated_h
+            ));
+        }
     }
     let is_protocol = run.settings().rows > 0;
     let tests = match is_protocol {

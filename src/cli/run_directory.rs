@@ -28,7 +28,7 @@ use avastra_world::sim::ENGINE;
 
 use super::campaign::{Campaign, KINDS, Kind, Outside};
 use super::error::Failure;
-use super::files::{folder, make, make_first, write, write_answers, write_named};
+use super::files::{folder, make, make_first, remove, write, write_answers, write_named};
 use super::load;
 use super::output::{Output, for_shell, plural};
 use super::{pack, shard};
@@ -352,13 +352,10 @@ pub fn what_was_begun(directory: &Path) -> Option<Kind> {
 /// The scenarios of a run or a training that are about the worst finding of each kind that recurs.
 ///
 /// # Errors
-/// If it is no such directory, or nothing recurs in it.
+/// If its settings or its database cannot be read, or nothing recurs in it.
 pub fn worst_of_each_kind(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
     let (settings, file) = (directory.join("run.yaml"), directory.join("run.db"));
     let shown = directory.shown();
-    if !settings.is_file() {
-        return Err(Failure::usage(format!("`{shown}` is no directory of a run: name scenarios")));
-    }
     let settings = load::text(&settings)?;
     let unread = |error| Failure::file("read", &file, error);
     let (database, _) = open_to_read::<run::Database>(&file, &settings)?;
@@ -638,6 +635,25 @@ impl<C: Campaign> Directory<C> {
         write_answers(&path, log)?;
         write(&path, &text)?;
         Ok(path)
+    }
+
+    /// Writes the scenario of an episode anew, after `change` has put its text into the database. A kill leaves no file that looks
+    /// as if the user had edited it: the old one is gone before, and the database has the text of a missing one.
+    pub fn rewrite_critical(
+        &mut self,
+        player: &Player,
+        (log, summary): Judged,
+        change: impl FnOnce(&mut C::Database, &str) -> Result<(), DatabaseError>,
+    ) -> Result<(), Failure> {
+        let name = format!("{}.ava", scenario_name(&log.road, summary.episode as i64));
+        let path = self.path.join("critical").join(name);
+        let found = summary.first_found(log).expect("a critical episode has a finding");
+        let text = player.file(&path, summary.episode, &|source| {
+            emit::scenario(player.table, (log, summary), found, source)
+        })?;
+        remove(&path)?;
+        self.write(|database| change(database, &text))?;
+        write(&path, &text)
     }
 
     /// Writes the counted collisions of an episode as a scenario, `critical/ROAD_NNNN.ava`, and gives the text of the

@@ -40,7 +40,7 @@ pub fn found_name(shrunk: &str) -> &str {
 /// Writes each file's scenario as small as possible, and checks every claim of what it wrote. Of a run's directory it takes the
 /// worst finding of each kind.
 pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failure> {
-    let files = arguments.many.files.iter().map(|path| match path.is_dir() {
+    let files = arguments.many.files.iter().map(|path| match path.join("run.yaml").is_file() {
         true => run_directory::worst_of_each_kind(path),
         false => Ok(vec![path.clone()]),
     });

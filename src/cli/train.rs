@@ -153,8 +153,10 @@ fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
 fn resumed(output: &Output, path: &Path) -> Result<(Training, Directory), Failure> {
     let Resumed { settings, text, table, held } = run_directory::resume(output, path, false)?;
     let mut directory = Directory::open(held, &text)?;
-    let checkpoint =
-        directory.database.return_to_checkpoint().map_err(|error| Failure::file("resume", path, error))?;
+    let checkpoint = directory
+        .database
+        .return_to_checkpoint(judging(&settings))
+        .map_err(|error| Failure::file("resume", path, error))?;
     let training = match checkpoint {
         None => Training::new(table, settings)?,
         Some(checkpoint) => {
@@ -207,6 +209,8 @@ fn evaluated(training: &Training, directory: &mut Directory) -> Result<Evaluatio
     let player = Player { command: "train", table: training.table(), agent, conditions };
     let in_words = |draw: &Draw| emit::action_text(training.table(), draw);
     let mut kept = Ok(());
+    // After a kill they may be there already. Then only their figures are lacking.
+    let is_kept = directory.read(Database::evaluated)? >= judging(training.settings());
     let mut keep = |mut summary: EpisodeSummary, log: &EpisodeLog| -> Result<(), Failure> {
         summary.episode += training.episodes();
         let scenario = is_written(training, log, &summary)
@@ -218,7 +222,7 @@ fn evaluated(training: &Training, directory: &mut Directory) -> Result<Evaluatio
     };
     let test = (u64::from(*evaluation), *seed);
     let evaluation = evaluate(training.arena(), &|| training.agent().actor(), test, &mut |summary, log| {
-        if kept.is_ok() {
+        if kept.is_ok() && !is_kept {
             kept = keep(summary, log);
         }
     });
@@ -234,8 +238,11 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
     let evaluation = evaluated(training, &mut directory)?;
     drop(working);
     let kept = training.agent().policy().map(|acting| {
-        output.tell("distilling rules from the network");
-        let _working = Working::new(output, "distilling rules from the network");
+        let distilling = "distilling rules from the network";
+        let _working = (evaluation.episodes > 0).then(|| {
+            output.tell(distilling);
+            Working::new(output, distilling)
+        });
         let policy = policy(training, acting, &evaluation);
         let path = write_policy(&policy, training.table().space(), &directory.path)?;
         Ok::<_, Failure>((path, policy))
@@ -278,7 +285,8 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
         }
     }
     let left = directory.read(|database| database.left(None))?;
-    if oracle::can_replay(training.arena().ads()) {
+    if oracle::can_replay(training.arena().ads()) && settings.hyperparameters.observation_period_s().is_none()
+    {
         output.say(&left.kinds_text());
     }
     let requirements = directory.read(Database::requirements)?;
@@ -366,8 +374,9 @@ fn find_recurrence(output: &Output, training: &Training, directory: &mut Directo
             let mut summary = EpisodeSummary::judged(&setup, episode, &log);
             summary.find_keepers(&setup, &log);
             summary.find_recurrence(&setup, &Script::of_scenario(&scenario), &log, oracle::REPLAYS);
-            let text = directory.write_critical(&player, (&log, &summary))?;
-            directory.write(|database| database.add_recurrence(&summary, table.space(), &text))?;
+            directory.rewrite_critical(&player, (&log, &summary), |database, text| {
+                database.add_recurrence(&summary, table.space(), text)
+            })?;
         }
     }
     Ok(())
@@ -382,6 +391,11 @@ fn search_text(directory: &Path, critical: &[PathBuf]) -> String {
             format!("a search has no policy file: {} in {}", plural(found, "scenario"), critical.shown())
         }
     }
+}
+
+/// Episodes on all roads together that judge what was learned.
+fn judging(settings: &TrainSettings) -> usize {
+    settings.evaluation as usize * settings.conditions.roads.len()
 }
 
 /// Episodes of an evaluation, on all roads together.

@@ -252,7 +252,7 @@ fn a_training_and_a_study_say_that_the_driving_system_failed() {
         "{stdout}"
     );
     let found = std::fs::read_dir(scratch.path().join("train/failures")).expect("they are written").count();
-    assert_eq!(found, 6, "two scenarios, their answers, and what happened");
+    assert_eq!(found, 51, "17 scenarios, their answers, and what happened");
 
     let space = root().join(SPACE).display().to_string();
     let study = serde_json::json!({

@@ -66,9 +66,6 @@ fn of_a_run_the_worst_of_each_kind_is_shrunk() {
     names.sort_unstable();
     let expected: Vec<String> = worst.iter().map(|name| format!("{name}_shrunk")).collect();
     assert_eq!(names, expected);
-
-    let folder = scratch.path().display().to_string();
-    fails(&["shrink", &folder], "is no directory of a run: name scenarios");
 }
 
 /// What becomes of these scenarios.

@@ -211,6 +211,43 @@ fn a_training_by_time_goes_on_to_the_same_bytes() {
     assert!(bytes(&whole) == bytes(&killed_out), "kills in the training");
 }
 
+/// A training that is over keeps what was tested at its end: to go on with it changes nothing, and neither does a kill between two
+/// of its replays. What its policy claims holds in the traffic that it was trained in.
+#[test]
+fn a_training_that_is_over_stays_as_it_is() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("training");
+    let fault = "scenarios/ads/faults/planning_never_yields.yaml";
+    let words = ["train", "scenarios/avastra45.ava", "--road", "corner", "--hours", "0.4", "--evaluate", "6"];
+    let config = scratch.path().join("small.yaml");
+    std::fs::write(&config, SMALL).expect("it is writable");
+    let (config, at) = (config.display().to_string(), out.display().to_string());
+    let how = ["--ads", fault, "--traffic", "released", "--seed", "5", "--config", &config, "--out", &at];
+    done(&[&words[..], &how].concat());
+    let all = || -> Vec<(std::path::PathBuf, Vec<u8>)> {
+        let files = entries(out.join("critical")).into_iter().chain([out.join("run.db")]);
+        files
+            .filter(|path| path.is_file())
+            .map(|path| (path.clone(), std::fs::read(path).expect("it is readable")))
+            .collect()
+    };
+    let whole = all();
+    let tested = whole
+        .iter()
+        .filter(|(_, bytes)| String::from_utf8_lossy(bytes).contains("expect recurrence"))
+        .count();
+    assert!(tested >= 2, "{tested} of {} were tested", whole.len());
+    done(&["train", "--resume", &at]);
+    assert!(all() == whole, "gone on with when it was over");
+    // As a kill leaves it before the last results: a file is gone, and the database has its text.
+    change(&out.join("run.db"), "DELETE FROM result");
+    let (file, _) = &whole[0];
+    std::fs::remove_file(file).expect("it is there");
+    done(&["train", "--resume", &at]);
+    assert!(all() == whole, "gone on with after a kill");
+    done(&["replay", &out.join("policy/corner_ddqn_5.ava").display().to_string()]);
+}
+
 /// A training by time keeps what its evaluation found, and names the kinds that recur.
 #[test]
 fn a_training_by_time_keeps_all_that_it_finds() {

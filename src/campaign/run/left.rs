@@ -129,9 +129,10 @@ impl Database {
                 counts.iter().max().zip(counts.iter().min()).is_some_and(|(most, least)| most - least <= 1);
             run.rows == 0 && can_tell(run.replays) && is_even
         });
-        let is_known = is_told && !found.is_untried;
-        let next_hour =
-            (is_known && simulated_h > 0.0).then(|| NextHour::after(simulated_h, seen_in(1), seen_in(2)));
+        // An episode in which the driving system failed was not driven to its end.
+        let has_failed = !self.failures()?.is_empty();
+        let is_known = is_told && !found.is_untried && !has_failed && simulated_h > 0.0;
+        let next_hour = is_known.then(|| NextHour::after(simulated_h, seen_in(1), seen_in(2)));
         Ok(Left { simulated_h, kinds, next_hour })
     }
 
@@ -156,10 +157,10 @@ impl Database {
         let rows = query_all(&self.connection, query, |row| {
             let (number, name): (Option<u32>, String) = (row.get(1)?, row.get(2)?);
             let cause: Option<String> = row.get(3)?;
-            let cause = cause.filter(|modules| !modules.is_empty());
             let kind = match (number, cause) {
                 (None, _) => name,
                 (Some(number), None) => format!("{number} {name}"),
+                (Some(number), Some(none)) if none.is_empty() => format!("{number} {name}, no cause found"),
                 (Some(number), Some(modules)) => {
                     format!("{number} {name}, {}", modules.replace(' ', " and "))
                 }

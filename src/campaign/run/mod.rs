@@ -43,7 +43,7 @@ pub use offered::{Offered, RowCount};
 pub use play::{Run, play};
 pub use profile::{
     Asked, DEFAULT_ADS, Profile, TrafficRecord, driving_system, found_with, recorded, recorded_traffic,
-    started, trained_against,
+    started, trained_against, trained_in,
 };
 pub use protocol::{Ending, HeatMap, ProtocolTest, Tally, heat_maps, main_maps, parameters};
 pub use sealed::differences as settings_differences;

@@ -227,6 +227,16 @@ pub fn trained_against(policy: &Policy) -> Result<Selected, RunError> {
     selected(&policy.name, &origin.ads, origin.profile.as_deref(), origin.profile_digest.as_deref())
 }
 
+/// The traffic that a policy was trained in.
+///
+/// # Errors
+/// If it is no profile of this version.
+pub fn trained_in(policy: &Policy) -> Result<TrafficProfile, RunError> {
+    let Some(traffic) = &policy.origin.traffic else { return Ok(TrafficProfile::default()) };
+    let profile = TrafficProfile::shipped(traffic).or_else(|_| TrafficProfile::from_yaml(traffic));
+    profile.map_err(|error| RunError::Traffic { name: policy.name.clone(), error })
+}
+
 /// A driving system as the file of this name records it.
 fn selected(
     name: &str,

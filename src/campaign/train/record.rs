@@ -101,11 +101,12 @@ impl Database {
     }
 
     /// Returns the last checkpoint and deletes all episodes after it. Without a checkpoint, all episodes are
-    /// deleted.
+    /// deleted. A whole evaluation of so many episodes stays: what recurs was perhaps tested after it.
     ///
     /// # Errors
     /// If the file cannot be read or written, or the checkpoint is damaged.
-    pub fn return_to_checkpoint(&mut self) -> Result<Option<Checkpoint>, DatabaseError> {
+    pub fn return_to_checkpoint(&mut self, evaluation: usize) -> Result<Option<Checkpoint>, DatabaseError> {
+        let is_evaluated = self.evaluated()? >= evaluation;
         let transaction = self.connection.transaction()?;
         let kept: Option<(i64, String, Vec<u8>)> = transaction
             .query_row("SELECT episodes, digest, learner FROM checkpoint", [], |row| {
@@ -124,9 +125,21 @@ impl Database {
             }
         };
         let first = checkpoint.as_ref().map_or(0, |checkpoint| checkpoint.episodes) as i64;
-        LAYOUT.delete_from(&transaction, first)?;
+        if !is_evaluated || checkpoint.is_none() {
+            LAYOUT.delete_from(&transaction, first)?;
+        }
         transaction.commit()?;
         Ok(checkpoint)
+    }
+
+    /// The number of episodes that judge what was learned: they begin when the training is over.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn evaluated(&self) -> Result<usize, DatabaseError> {
+        let query = "SELECT count(*) FROM episode WHERE episode NOT IN (SELECT episode FROM learning)";
+        let count: i64 = self.connection.query_row(query, [], |row| row.get(0))?;
+        Ok(usize::try_from(count).unwrap_or(0))
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::episode;
 use crate::episode::Moment;
-use crate::run::{Arena, RunError, choose, trained_against};
+use crate::run::{Arena, RunError, choose, trained_against, trained_in};
 use avastra_base::rng;
 use avastra_base::rng::{Rng, Stream};
 use avastra_lang::model::Policy;
@@ -63,7 +63,8 @@ pub fn training_arena(
 ) -> Result<Arena, RunError> {
     let table = with_period(table.clone(), acting.settings().payment.observation_period_s);
     let origin = &policy.origin;
-    Arena::new(table, roads, trained_against(policy)?, &origin.with, &origin.without)
+    let arena = Arena::new(table, roads, trained_against(policy)?, &origin.with, &origin.without)?;
+    Ok(arena.with_traffic(trained_in(policy)?))
 }
 
 /// The visits of `episodes` episodes on each road; their seeds come from a stream, numbered from `first`.

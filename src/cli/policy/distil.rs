@@ -31,7 +31,9 @@ pub fn distil(output: &Output, arguments: &DistilArguments) -> Result<(), Failur
     }
     if policy.claims.is_none() {
         let path = arguments.file.shown();
-        return Err(Failure::usage(format!("`{path}` makes no claims: train it with `avastra train`")));
+        return Err(Failure::usage(format!(
+            "`{path}` makes no claims, because it was trained with `--evaluate 0`: train it with an evaluation"
+        )));
     }
     let acting = acting(&table, &policy, Face::Network)?;
     if acting.settings().rules.rules_leaves == 0 {
