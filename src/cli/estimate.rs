@@ -24,8 +24,8 @@ use super::interrupt::stop_on_interrupt;
 use super::output::{Output, for_shell, plural};
 use super::parallel::jobs;
 use super::progress::{Progress, Working};
-use super::run::{critical_text, cut_short, next_text};
 use super::run_directory::{Player, Resumed, written};
+use super::summary::{critical_text, cut_short, next_text};
 use super::{conditions, load, merge, run_directory, shard};
 
 /// Episodes of a part, if a command line gives no number.

@@ -12,7 +12,7 @@ use avastra_drivers::external::{ExternalSettings, FailureKind, Program, Thinking
 use super::error::Failure;
 use super::load;
 use super::output::{Output, plural};
-use super::run::cut_short;
+use super::summary::cut_short;
 
 /// How often a driving system that says it is deterministic is asked again. Where it answers otherwise in half of its plays, all of these
 /// agree in 3 % of checks.

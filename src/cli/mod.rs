@@ -52,6 +52,7 @@ mod schema;
 mod shard;
 mod shrink;
 mod study;
+mod summary;
 mod test;
 mod train;
 mod trials;

@@ -31,8 +31,8 @@ use super::load::UnderTest;
 use super::output::{Output, for_shell, plural};
 use super::policy::distil::{self, rules_text};
 use super::progress::{TrainingProgress, Working};
-use super::run::{groups_text, requirements_text};
 use super::run_directory::{Player, Resumed};
+use super::summary::{groups_text, requirements_text};
 use super::{load, run_directory};
 
 /// Episodes between two checkpoints: at most so many are played again after a kill.
