@@ -333,8 +333,8 @@ fn missing_of_training(
     // A training by time has as many episodes as it took; it is done if it has results.
     let is_done = matches!(database.results(), Ok(Some(_)) | Err(DatabaseError::Results));
     let there = database.episodes().map_err(unread)?;
-    let judged = training.evaluation as usize * training.conditions.roads.len();
-    let wanted = if training.hours.is_some() { there.len() } else { training.episodes as usize + judged };
+    let wanted =
+        if training.hours.is_some() { there.len() } else { training.episodes as usize + training.judging() };
     let lacking = wanted.saturating_sub(there.len());
     let is_gap = there.last().is_some_and(|&last| last >= there.len());
     Ok(match is_gap {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use avastra_base::outside::Shown;
 use avastra_campaign::oracle::mixed_text;
-use avastra_campaign::run::{FoundIn, Group, RefusalCount, RequirementCount, Totals};
+use avastra_campaign::run::{FoundIn, Group, RefusalCount, RequirementCount, Totals, cause_text};
 
 use super::output::{for_shell, plural};
 
@@ -115,11 +115,7 @@ pub fn refusals_text(refusals: &[RefusalCount]) -> String {
 /// recurs, and what happened there.
 pub fn groups_text(groups: &[Group]) -> String {
     let line = |group: &Group| {
-        let cause = match group.cause.as_deref() {
-            None => String::new(),
-            Some("") => ", no cause found".to_owned(),
-            Some(modules) => format!(", {}", modules.replace(' ', " and ")),
-        };
+        let cause = cause_text(group.cause.as_deref());
         let priority = match group.priority.as_str() {
             "ego" => ", ego first",
             "other" => ", the other first",
@@ -210,8 +206,8 @@ pub fn critical_text(directory: &Path, files: &[PathBuf], found: &[FoundIn]) -> 
     text
 }
 
-/// What to do next: look at the findings and make the worst of each kind small, or the first of them if none is known to recur, or
-/// look at the nearest misses, or find more.
+/// The next step: to look at the findings and make the worst of each kind small. If none is known to recur, the first is made
+/// small. Without findings, it is to look at the nearest misses, or to find more.
 pub fn next_text(directory: &Path, critical: &[PathBuf], recurs: bool, kept: &[PathBuf]) -> String {
     let directory = for_shell(directory);
     match (critical.first(), kept) {

@@ -151,11 +151,12 @@ fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
 
 /// The rest of an interrupted training.
 fn resumed(output: &Output, path: &Path) -> Result<(Training, Directory), Failure> {
-    let Resumed { settings, text, table, held } = run_directory::resume(output, path, false)?;
+    let Resumed { settings, text, table, held } =
+        run_directory::resume::<TrainSettings>(output, path, false)?;
     let mut directory = Directory::open(held, &text)?;
     let checkpoint = directory
         .database
-        .return_to_checkpoint(judging(&settings))
+        .return_to_checkpoint(settings.judging())
         .map_err(|error| Failure::file("resume", path, error))?;
     let training = match checkpoint {
         None => Training::new(table, settings)?,
@@ -210,7 +211,7 @@ fn evaluated(training: &Training, directory: &mut Directory) -> Result<Evaluatio
     let in_words = |draw: &Draw| emit::action_text(training.table(), draw);
     let mut kept = Ok(());
     // After a kill they may be there already. Then only their figures are lacking.
-    let is_kept = directory.read(Database::evaluated)? >= judging(training.settings());
+    let is_kept = directory.read(Database::evaluated)? >= training.settings().judging();
     let mut keep = |mut summary: EpisodeSummary, log: &EpisodeLog| -> Result<(), Failure> {
         summary.episode += training.episodes();
         let scenario = is_written(training, log, &summary)
@@ -271,7 +272,7 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
     if evaluation.episodes > 0 {
         output.say(&format!(
             "what it learned, on {} of its own: {} counted in {}",
-            plural(played(settings, &evaluation), "episode"),
+            plural(settings.judging(), "episode"),
             plural(evaluation.counted as usize, "collision"),
             plural(evaluation.colliding as usize, "episode"),
         ));
@@ -313,7 +314,7 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
         output.say(&format!("\nthe driving system failed in the episodes of what it learned: {kinds}"));
     }
     let failed = totals.failed as usize + failed(&evaluation);
-    let all = totals.episodes as usize + played(settings, &evaluation);
+    let all = totals.episodes as usize + settings.judging();
     if failed > 0 {
         output.warn(&format!(
             "the driving system failed in {} of {}, which ended there: that these have few collisions says nothing; \
@@ -326,7 +327,7 @@ fn finish(output: &Output, training: &Training, mut directory: Directory) -> Res
     let is_reproducible = is_reproducible(output, training.arena().program());
     cut_off(training.arena().program()).iter().for_each(|note| output.warn(note));
     let evaluation = serde_json::json!({
-        "episodes": played(settings, &evaluation), "collisions": evaluation.collisions,
+        "episodes": settings.judging(), "collisions": evaluation.collisions,
         "counted": evaluation.counted, "colliding": evaluation.colliding,
         "simulated_h": evaluation.simulated_s / 3600.0, "return": evaluation.return_mean,
         "failures": evaluation.failures,
@@ -391,16 +392,6 @@ fn search_text(directory: &Path, critical: &[PathBuf]) -> String {
             format!("a search has no policy file: {} in {}", plural(found, "scenario"), critical.shown())
         }
     }
-}
-
-/// Episodes on all roads together that judge what was learned.
-fn judging(settings: &TrainSettings) -> usize {
-    settings.evaluation as usize * settings.conditions.roads.len()
-}
-
-/// Episodes of an evaluation, on all roads together.
-fn played(settings: &TrainSettings, evaluation: &Evaluation) -> usize {
-    evaluation.episodes as usize * settings.conditions.roads.len()
 }
 
 /// Episodes of an evaluation that ended because the driving system failed.
@@ -499,7 +490,7 @@ fn headline(training: &Training, evaluation: &Evaluation) -> String {
     format!(
         "{trained}: {} in {} of its own.{failed}",
         plural(evaluation.counted as usize, "counted collision"),
-        plural(played(settings, evaluation), "episode"),
+        plural(settings.judging(), "episode"),
     )
 }
 

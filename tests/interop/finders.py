@@ -112,7 +112,8 @@ def table(cells):
     ]
     samples = {key: [len(cell["kinds"]) for cell in own] for key, own in of.items()}
     both = [(samples[driver, finder], samples[driver, base]) for finder, base, driver in pairs]
-    corrected = dict(zip(pairs, holm([rank_p(*pair) for pair in both])))
+    plain = [rank_p(*pair) for pair in both]
+    corrected = dict(zip(pairs, holm(plain)))
     effect = dict(zip(pairs, (superiority(*pair) for pair in both)))
     lines += ["", f"| comparison | {' | '.join(drivers)} |", "|---|" + "--:|" * len(drivers)]
     for base in BASELINES:
@@ -123,6 +124,12 @@ def table(cells):
             ]
             if finder != base:
                 lines.append(f"| `{finder}` / `{base}` | {' | '.join(entries)} |")
+    told = [f"`{finder}` / `{base}` on {driver} (p {p:.3f})" for (finder, base, driver), p in zip(pairs, plain) if p < 0.05]
+    lines += ["", f"Without the correction, p is below 0.05 for: {'; '.join(told)}"]
+    for driver in drivers:
+        episodes = {finder: statistics.mean(cell["episodes"] for cell in of[driver, finder]) for finder in finders if of[driver, finder]}
+        lines.append(f"Episodes on {driver}: " + ", ".join(f"{finder} {count:.0f}" for finder, count in episodes.items()))
+    lines.append(f"{sum(cell['cpu_s'] for own in of.values() for cell in own) / 60:.0f} minutes of a processor")
     return "\n".join(lines)
 
 

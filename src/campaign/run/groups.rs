@@ -129,6 +129,15 @@ impl Group {
     }
 }
 
+/// The modules at fault, behind the name of a kind; nothing if they were not looked for.
+pub fn cause_text(cause: Option<&str>) -> String {
+    match cause {
+        None => String::new(),
+        Some("") => ", no cause found".to_owned(),
+        Some(modules) => format!(", {}", modules.replace(' ', " and ")),
+    }
+}
+
 /// The word of [`kind`] for a pedestrian.
 pub(crate) const PEDESTRIAN: &str = "pedestrian";
 

@@ -11,6 +11,7 @@ use crate::episode::PreCrash;
 use crate::oracle::{Recurrence, can_tell};
 use crate::run::database::{Database, from_columns};
 use crate::run::findings::scenario_name;
+use crate::run::groups::cause_text;
 use crate::run::sealed::{DatabaseError, query_all};
 use crate::run::settings::{Budget, RunSettings};
 
@@ -157,13 +158,9 @@ impl Database {
         let rows = query_all(&self.connection, query, |row| {
             let (number, name): (Option<u32>, String) = (row.get(1)?, row.get(2)?);
             let cause: Option<String> = row.get(3)?;
-            let kind = match (number, cause) {
-                (None, _) => name,
-                (Some(number), None) => format!("{number} {name}"),
-                (Some(number), Some(none)) if none.is_empty() => format!("{number} {name}, no cause found"),
-                (Some(number), Some(modules)) => {
-                    format!("{number} {name}, {}", modules.replace(' ', " and "))
-                }
+            let kind = match number {
+                None => name,
+                Some(number) => format!("{number} {name}{}", cause_text(cause.as_deref())),
             };
             let is_kind = number != PreCrash::Other.number() && kind != PreCrash::Wreck.name();
             let recurrence = from_columns(row.get(4)?, row.get(5)?);

@@ -36,7 +36,7 @@ pub(crate) use database::{LAYOUT, add_all};
 pub use findings::{FoundIn, Near, scenario_name};
 pub use gauges::Gauges;
 pub(crate) use groups::PEDESTRIAN;
-pub use groups::{Group, kind};
+pub use groups::{Group, cause_text, kind};
 pub use left::{Left, NextHour, SeenKind};
 pub use offered::in_words as refusal_in_words;
 pub use offered::{Offered, RowCount};

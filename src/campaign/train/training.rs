@@ -40,6 +40,13 @@ pub struct TrainSettings {
     pub hyperparameters: Settings,
 }
 
+impl TrainSettings {
+    /// Episodes on all roads together that judge what was learned.
+    pub fn judging(&self) -> usize {
+        self.evaluation as usize * self.conditions.roads.len()
+    }
+}
+
 /// A training that is ready to go on.
 pub struct Training {
     arena: Arena,
