@@ -22,9 +22,10 @@ const STARTER: [(&str, &str); 3] = [
 ];
 
 /// The files of the paper's space, which the examples use: their names, from its folder, and their texts.
-pub const SHIPPED: [(&str, &str); 6] = [
+pub const SHIPPED: [(&str, &str); 7] = [
     ("avastra45.ava", include_str!("../../scenarios/avastra45.ava")),
     ("roads.ava", include_str!("../../scenarios/roads.ava")),
+    ("sides.ava", include_str!("../../scenarios/sides.ava")),
     ("roads/boulevard.xodr", include_str!("../../scenarios/roads/boulevard.xodr")),
     ("roads/corner.xodr", include_str!("../../scenarios/roads/corner.xodr")),
     ("roads/crossroad.xodr", include_str!("../../scenarios/roads/crossroad.xodr")),
@@ -78,6 +79,7 @@ const CATALOGUE: [(&str, &str, Files); 4] = [
         &[
             ("motorway.ava", include_str!("../../scenarios/motorway.ava")),
             ("moves.ava", include_str!("../../scenarios/moves.ava")),
+            ("sides.ava", include_str!("../../scenarios/sides.ava")),
             ("roads/motorway.xodr", include_str!("../../scenarios/roads/motorway.xodr")),
         ],
     ),

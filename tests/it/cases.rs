@@ -47,7 +47,9 @@ pub fn stem(path: &Path) -> String {
 pub fn copy_space(folder: &Path) {
     std::fs::create_dir_all(folder.join("roads")).expect("it is writable");
     let roads = ["corner", "residential", "boulevard", "crossroad"].map(|road| format!("roads/{road}.xodr"));
-    for name in ["avastra45.ava", "roads.ava"].into_iter().chain(roads.iter().map(String::as_str)) {
+    for name in
+        ["avastra45.ava", "roads.ava", "sides.ava"].into_iter().chain(roads.iter().map(String::as_str))
+    {
         std::fs::copy(root().join("scenarios").join(name), folder.join(name)).expect("it is shipped");
     }
 }

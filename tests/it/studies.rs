@@ -160,6 +160,7 @@ fn two_baselines_are_compared_once() {
         training_seed: None,
         trained: Vec::new(),
         episodes: Vec::new(),
+        kinds: [].into(),
         spent: None,
     };
     let cells = ["none", "random", "space-filling"].map(|agent| [cell(agent, 0), cell(agent, 1)]).concat();
@@ -178,7 +179,7 @@ fn two_baselines_are_compared_once() {
 fn kept_and_written_again(scratch: &Path, played: &Path) {
     let scenarios = scratch.join("scenarios");
     std::fs::create_dir_all(scenarios.join("studies")).expect("it is writable");
-    for shared in ["avastra45.ava", "roads.ava", "roads", "ads"] {
+    for shared in ["avastra45.ava", "roads.ava", "sides.ava", "roads", "ads"] {
         let link = scenarios.join(shared);
         std::os::unix::fs::symlink(root().join("scenarios").join(shared), link).expect("links can be made");
     }

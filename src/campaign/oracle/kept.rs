@@ -27,15 +27,25 @@ pub struct Breached {
     pub recurrence: Option<Recurrence>,
 }
 
+impl Breached {
+    /// Every requirement of which a log has a breach, in the order of their first ones, not yet judged.
+    pub fn all(log: &EpisodeLog) -> Vec<Breached> {
+        let breached = |first: &Breach| Breached {
+            requirement: first.requirement,
+            kept_by: Vec::new(),
+            recurrence: None,
+        };
+        log.first_breaches().map(breached).collect()
+    }
+}
+
 /// Every requirement of which a log has a breach, in the order of their first ones, judged by playing the episode again with
 /// each careful driver.
 pub fn breached(setup: &Setup, script: &Script, log: &EpisodeLog) -> Vec<Breached> {
     let firsts: Vec<&Breach> = log.first_breaches().collect();
     // No step after the last of them.
     let Some(last) = firsts.last() else { return Vec::new() };
-    let breached =
-        |first: &&Breach| Breached { requirement: first.requirement, kept_by: Vec::new(), recurrence: None };
-    let mut found: Vec<Breached> = firsts.iter().map(breached).collect();
+    let mut found = Breached::all(log);
     for name in CAREFUL {
         let entry = ads::by_name(name).expect("careful drivers are driving systems of avastra");
         let setup = Setup { ads: Selected::new(entry), ..setup.clone() };

@@ -158,13 +158,8 @@ impl Database {
         let rows = query_all(&self.connection, query, |row| {
             let (number, name): (Option<u32>, String) = (row.get(1)?, row.get(2)?);
             let cause: Option<String> = row.get(3)?;
-            let kind = match number {
-                None => name,
-                Some(number) => format!("{number} {name}{}", cause_text(cause.as_deref())),
-            };
-            let is_kind = number != PreCrash::Other.number() && kind != PreCrash::Wreck.name();
             let recurrence = from_columns(row.get(4)?, row.get(5)?);
-            Ok((row.get(0)?, is_kind.then_some(kind), recurrence, row.get::<_, f64>(6)?))
+            Ok((row.get(0)?, kind_name(number, &name, cause.as_deref()), recurrence, row.get::<_, f64>(6)?))
         })?;
         let mut found = Found::default();
         let mut last: Option<i64> = None;
@@ -179,6 +174,16 @@ impl Database {
         }
         Ok(found)
     }
+}
+
+/// The name of a kind: of a pre-crash type, which has a number, with the modules at fault if they were looked for; of a
+/// requirement, which has none. `None` of what is not a kind.
+pub(crate) fn kind_name(number: Option<u32>, name: &str, cause: Option<&str>) -> Option<String> {
+    let is_kind = number != PreCrash::Other.number() && name != PreCrash::Wreck.name();
+    is_kind.then(|| match number {
+        None => name.to_owned(),
+        Some(number) => format!("{number} {name}{}", cause_text(cause)),
+    })
 }
 
 /// What recurs in which episode.

@@ -37,6 +37,7 @@ pub use findings::{FoundIn, Near, scenario_name};
 pub use gauges::Gauges;
 pub(crate) use groups::PEDESTRIAN;
 pub use groups::{Group, cause_text, kind};
+pub(crate) use left::kind_name;
 pub use left::{Left, NextHour, SeenKind};
 pub use offered::in_words as refusal_in_words;
 pub use offered::{Offered, RowCount};

@@ -1,7 +1,7 @@
 //! `study.db`: the cells of a study, in SQLite. The cells of one job are one transaction. They are numbered as they come, and
 //! by their place in the study when it is settled.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rusqlite::types::Type as Kind;
 use rusqlite::{Connection, Row, params};
@@ -13,10 +13,10 @@ use crate::study::settings::StudySettings;
 
 /// Versions begin at 1001, so that a `run.db` is never taken for a `study.db`.
 pub(crate) const LAYOUT: Layout = Layout {
-    version: 1007,
+    version: 1008,
     schema: || SCHEMA.to_owned(),
     unit: "cell",
-    tables: &["cell", "trained", "evaluated", "collision"],
+    tables: &["cell", "trained", "evaluated", "collision", "kind"],
     naming: None,
     local: &[],
     apart: &[],
@@ -53,6 +53,7 @@ CREATE TABLE collision (
   avoidability TEXT NOT NULL, kind TEXT NOT NULL, manoeuvre TEXT NOT NULL, approach TEXT NOT NULL,
   side TEXT NOT NULL, cause TEXT, priority TEXT NOT NULL, PRIMARY KEY (cell, episode, number)
 ) STRICT;
+CREATE TABLE kind (cell INTEGER NOT NULL REFERENCES cell, kind TEXT NOT NULL, PRIMARY KEY (cell, kind)) STRICT;
 ";
 
 /// An open study database.
@@ -106,6 +107,9 @@ impl StudyDatabase {
             for (index, episode) in record.episodes.iter().enumerate() {
                 add_episode(&transaction, cell, index as i64, episode)?;
             }
+            for kind in &record.kinds {
+                insert_row(&transaction, "kind", params![cell, kind])?;
+            }
             LAYOUT.seal(&transaction, cell)?;
         }
         transaction.commit()?;
@@ -149,6 +153,7 @@ impl StudyDatabase {
                         .transpose()?,
                     trained: Vec::new(),
                     episodes: Vec::new(),
+                    kinds: BTreeSet::new(),
                     spent: None,
                 })
             })?
@@ -160,6 +165,11 @@ impl StudyDatabase {
         )?;
         for (cell, episode) in trained {
             cells.entry(cell).and_modify(|cell| cell.trained.push(episode));
+        }
+        for (cell, kind) in self.by_cell("SELECT cell, kind FROM kind", |row| row.get(1))? {
+            if let Some(cell) = cells.get_mut(&cell) {
+                cell.kinds.insert(kind);
+            }
         }
         let evaluated = self.by_cell(
             "SELECT cell, seed, number, ended, duration_s, distance_m, red_runs, speeding_s, astray_s, trace

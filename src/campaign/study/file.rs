@@ -93,7 +93,8 @@ pub struct AgentFile {
     pub config: Option<Value>,
     /// Independent trainings of a learning agent; without a number 10.
     pub trainings: Option<u32>,
-    /// Episodes of a training, on all its roads together; without a number 750.
+    /// Episodes of a training, on all its roads together; without a number 750. Of an agent that does not learn, episodes
+    /// that it searches on each road before it is judged; without a number none.
     pub episodes: Option<u32>,
     /// Roads that one training goes round, to be evaluated on each road of the study; none named: a training
     /// for each road of the study, on that road alone.

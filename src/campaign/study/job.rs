@@ -6,6 +6,7 @@ use crate::run::on_threads;
 use crate::train::Training;
 use avastra_search::agent::{Agent, Diverged};
 
+use crate::study::found::Found;
 use crate::study::ready::Study;
 use crate::study::record::{CellRecord, EpisodeRecord, Spent, TrainedRecord};
 use crate::study::settings::AgentSettings;
@@ -78,7 +79,7 @@ fn play(
 ) -> Result<Option<Vec<CellRecord>>, Diverged> {
     let mut begun = clock();
     let agent = study.agent(job);
-    let mut trained = Vec::new();
+    let (mut trained, mut found) = (Vec::new(), Found::default());
     let mut training = agent
         .training
         .is_some()
@@ -87,6 +88,7 @@ fn play(
         while !training.is_done() {
             let episode = training.episode()?;
             trained.push(TrainedRecord::new(&episode));
+            found.note(|| training.setup(training.episodes() - 1), &episode.summary, &episode.log);
             if !tell(episode.summary.counted()) {
                 return Ok(None);
             }
@@ -95,6 +97,18 @@ fn play(
     let mut cells = Vec::new();
     for &road in &job.roads {
         let road = &study.settings().conditions.roads[road];
+        let mut found = found.clone();
+        if let Some(search) = study.search(job, road).expect("the study was checked when it was made") {
+            trained.clear();
+            for number in 0..search.episodes() {
+                let (summary, log) = search.judged(number);
+                trained.push(TrainedRecord::of_search(&summary, &log));
+                found.note(|| search.setup(number), &summary, &log);
+                if !tell(summary.counted()) {
+                    return Ok(None);
+                }
+            }
+        }
         let mut episodes = Vec::new();
         for seed in 0..study.settings().evaluation.seeds {
             let run = study.evaluation(job, seed, road).expect("the study was checked when it was made");
@@ -104,11 +118,13 @@ fn play(
                     None => run.judged(number),
                 };
                 episodes.push(EpisodeRecord::new(run.settings().seed, &summary, &log));
+                found.note(|| run.setup(number), &summary, &log);
                 if !tell(summary.counted()) {
                     return Ok(None);
                 }
             }
         }
+        let kinds = found.recurring();
         let now = clock();
         let spent = Spent {
             wall_s: now.wall_s - begun.wall_s,
@@ -122,6 +138,7 @@ fn play(
             training_seed: agent.training.is_some().then(|| study.training_seed(job.number)),
             trained: trained.clone(),
             episodes,
+            kinds,
             spent: Some(spent),
         });
     }

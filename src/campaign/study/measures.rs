@@ -93,11 +93,13 @@ pub const MEASURES: &[Measure] = &[
     shown("training_counted", |cell, _| of_training(cell, |episode| f64::from(episode.counted))),
     // Counted collisions of an hour of everything that was simulated: trainings and evaluations.
     compared("counted_per_h", |cell, _| {
-        let trained = |of: fn(&TrainedRecord) -> f64| of_training(cell, of).unwrap_or(0.0);
-        let all_h = evaluation_h(cell) + trained(|episode| episode.simulated_s) / 3600.0;
         let counted = cell.episodes.iter().map(|episode| episode.counted() as f64).sum::<f64>();
-        (all_h > 0.0).then(|| (counted + trained(|episode| f64::from(episode.counted))) / all_h)
+        per_h(cell, counted + of_training(cell, |episode| f64::from(episode.counted)).unwrap_or(0.0))
     }),
+    // Kinds of failures that recur, among all that was found while it trained and was judged.
+    count(compared("kinds", |cell, _| Some(cell.kinds.len() as f64))),
+    // The same of an hour of everything that was simulated.
+    compared("kinds_per_h", |cell, _| per_h(cell, cell.kinds.len() as f64)),
 ];
 
 /// A cell without its episodes: all that the statistics need, and a line of a study that is kept (see `played`).
@@ -205,7 +207,13 @@ fn time_share(cell: &CellRecord, of: impl Fn(&EpisodeRecord) -> f64) -> Option<f
     (all_s > 0.0).then(|| cell.episodes.iter().map(of).sum::<f64>() / all_s)
 }
 
-/// The total over the episodes of the training, if there was one.
+/// The total over the episodes of the training, or of what was searched; `None` if there was neither.
 fn of_training(cell: &CellRecord, of: impl Fn(&TrainedRecord) -> f64) -> Option<f64> {
-    cell.training_seed.map(|_| cell.trained.iter().map(of).sum())
+    (!cell.trained.is_empty()).then(|| cell.trained.iter().map(of).sum())
+}
+
+/// A number of an hour of everything that was simulated.
+fn per_h(cell: &CellRecord, number: f64) -> Option<f64> {
+    let all_h = evaluation_h(cell) + of_training(cell, |episode| episode.simulated_s).unwrap_or(0.0) / 3600.0;
+    (all_h > 0.0).then(|| number / all_h)
 }

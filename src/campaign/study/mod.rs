@@ -22,6 +22,7 @@ mod agreement;
 mod database;
 mod failed;
 mod file;
+mod found;
 mod job;
 mod measures;
 mod played;

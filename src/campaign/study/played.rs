@@ -206,14 +206,14 @@ impl Played {
             let fewest = counts.min().unwrap_or(0);
             let (one, episodes) = match (&own.training, &agent.training) {
                 (Some(own), Some(wanted)) => ("trainings", Some((own.episodes, wanted.episodes))),
-                _ => ("repetitions", None),
+                _ => ("repetitions", Some((own.searched, agent.searched))),
             };
             if fewest < agent.repeats as usize {
                 let text = format!("{fewest} of {} {one}", agent.repeats);
                 alike.entry(text).or_default().push(&agent.label);
             }
             if let Some((own, wanted)) = episodes.filter(|(own, wanted)| own < wanted) {
-                let text = format!("trainings of {own} episodes in place of {wanted}");
+                let text = format!("{one} of {own} episodes in place of {wanted}");
                 alike.entry(text).or_default().push(&agent.label);
             }
         }
@@ -267,6 +267,7 @@ impl AgentSettings {
         let sizeless = |agent: &AgentSettings| {
             let mut agent = agent.clone();
             agent.repeats = 0;
+            agent.searched = 0;
             if let Some(training) = &mut agent.training {
                 training.episodes = 0;
             }

@@ -32,6 +32,7 @@ impl Study {
                 study.training(job).map_err(refuse)?;
             }
             for &road in &job.roads {
+                study.search(job, &study.settings.conditions.roads[road]).map_err(refuse)?;
                 let run = study.evaluation(job, 0, &study.settings.conditions.roads[road]).map_err(refuse)?;
                 attached = run.arena().attached();
             }
@@ -91,6 +92,21 @@ impl Study {
             hyperparameters: plan.hyperparameters.clone(),
         };
         Training::new(self.table.clone(), settings)
+    }
+
+    /// What an agent that does not learn searches before it is judged, on one road: with the seed of the trainings, so that
+    /// it meets their episodes. `None` if it searches nothing.
+    pub(super) fn search(&self, job: &Job, road: &str) -> Result<Option<Run>, RunError> {
+        let agent = self.agent(job);
+        if agent.searched == 0 {
+            return Ok(None);
+        }
+        let conditions = self.conditions(agent, vec![road.to_owned()]);
+        let settings = RunSettings {
+            avoidability: self.settings.avoidability.clone(),
+            ..RunSettings::new(conditions, &agent.name, agent.searched, self.training_seed(job.number))
+        };
+        Run::new(self.table.clone(), settings).map(Some)
     }
 
     /// The evaluation under one seed on one road. For a trained agent it is a run of `none`, with which the caller

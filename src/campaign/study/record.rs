@@ -1,5 +1,7 @@
 //! The record of a job: every evaluated episode with its collisions, and the learning curve.
 
+use std::collections::BTreeSet;
+
 use crate::episode::EpisodeLog;
 use crate::oracle;
 use crate::run::{EpisodeSummary, Finding, kind};
@@ -16,10 +18,12 @@ pub struct CellRecord {
     pub number: u32,
     /// The seed for `avastra train --seed`, if it was trained.
     pub training_seed: Option<u64>,
-    /// The training, episode by episode.
+    /// The training, episode by episode; of an agent that does not learn, what it searched before it was judged.
     pub trained: Vec<TrainedRecord>,
     /// All evaluated episodes, seed by seed.
     pub episodes: Vec<EpisodeRecord>,
+    /// The kinds of failures that recur, among all that it found.
+    pub kinds: BTreeSet<String>,
     /// `None` if it is not known; `study.db` does not keep it.
     pub spent: Option<Spent>,
 }
@@ -107,6 +111,21 @@ impl TrainedRecord {
             exploration_epsilon: episode.exploration_epsilon,
             loss: episode.lesson.loss,
             simulated_s: episode.simulated_s,
+        }
+    }
+}
+
+impl TrainedRecord {
+    /// Of an agent that does not learn: it is paid nothing.
+    pub fn of_search(summary: &EpisodeSummary, log: &EpisodeLog) -> TrainedRecord {
+        TrainedRecord {
+            ended: log.end.name().to_owned(),
+            sum: 0.0,
+            collisions: log.collisions.len() as u32,
+            counted: summary.counted() as u32,
+            exploration_epsilon: 1.0,
+            loss: None,
+            simulated_s: log.duration_s,
         }
     }
 }

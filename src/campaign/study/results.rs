@@ -332,7 +332,11 @@ fn per_1000_km(events: u64, driven_km: f64) -> Rate {
     Rate { events, rate: Some(scaled(events as f64)), interval: Some(interval) }
 }
 
+/// The learning curve; of an agent that does not learn it has no points.
 fn curve(cells: &[&CellRecord]) -> Vec<CurvePoint> {
+    if cells.iter().any(|cell| cell.training_seed.is_none()) {
+        return Vec::new();
+    }
     let episodes = cells.iter().map(|cell| cell.trained.len()).min().unwrap_or(0);
     let points = CURVE_POINTS.min(episodes);
     let point = |number: usize| {

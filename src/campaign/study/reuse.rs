@@ -86,8 +86,9 @@ impl StudySettings {
 
     /// Whether an agent is one of another study, but for its label and how often it is repeated.
     fn is_same(&self, agent: &AgentSettings, other: &StudySettings, one: &AgentSettings) -> bool {
-        let AgentSettings { name, training, profile, without, with, label: _, repeats: _ } = agent;
+        let AgentSettings { name, searched, training, profile, without, with, label: _, repeats: _ } = agent;
         *name == one.name
+            && *searched == one.searched
             && *training == one.training
             && profile.as_ref().or(self.conditions.profile.as_ref())
                 == one.profile.as_ref().or(other.conditions.profile.as_ref())

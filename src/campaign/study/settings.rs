@@ -41,6 +41,9 @@ pub struct AgentSettings {
     pub name: String,
     /// Independent trainings, or repetitions where nothing is learned.
     pub repeats: u32,
+    /// Episodes that it searches before it is judged, if it does not learn.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub searched: u32,
     /// How it is trained, if it learns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub training: Option<TrainingPlan>,
@@ -189,7 +192,8 @@ impl StudySettings {
         let EvaluationPlan { episodes, seeds, .. } = self.evaluation;
         let training = self.agents[job.agent].training.as_ref();
         let training = training.map_or(0, |training| u64::from(training.episodes));
-        training + u64::from(episodes) * u64::from(seeds) * job.roads.len() as u64
+        let searched = u64::from(self.agents[job.agent].searched);
+        training + (searched + u64::from(episodes) * u64::from(seeds)) * job.roads.len() as u64
     }
 
     /// All cells in the order of the jobs: agent, road, and number of the training or repetition.
@@ -207,12 +211,19 @@ impl StudySettings {
         self.evaluation.seeds = self.evaluation.seeds.min(1);
         for agent in &mut self.agents {
             agent.repeats = agent.repeats.min(QUICK_REPEATS);
+            agent.searched = agent.searched.min(QUICK_EPISODES);
             if let Some(training) = &mut agent.training {
                 training.episodes = training.episodes.min(QUICK_EPISODES);
             }
         }
         self
     }
+}
+
+/// Whether nothing is searched: then the settings do not say so.
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for it")]
+fn is_zero(number: &u32) -> bool {
+    *number == 0
 }
 
 /// One agent's settings in full.
@@ -222,11 +233,11 @@ fn agent_settings(
 ) -> Result<AgentSettings, StudyError> {
     let label = file.label.unwrap_or_else(|| file.name.clone());
     let entry = agent_named(&file.name).map_err(|error| StudyError::Agent { label: label.clone(), error })?;
+    let mut searched = 0;
     let (repeats, training) = match entry.kind {
         Kind::Ready(_) => {
             let learning = [
                 ("trainings", file.trainings.is_some()),
-                ("episodes", file.episodes.is_some()),
                 ("preset", file.preset.is_some()),
                 ("config", file.config.is_some()),
                 ("train_roads", !file.train_roads.is_empty()),
@@ -235,6 +246,7 @@ fn agent_settings(
             if let Some((field, _)) = learning.into_iter().find(|(_, is_there)| *is_there) {
                 return Err(StudyError::NotLearning { label, name: file.name, field });
             }
+            searched = file.episodes.unwrap_or(0);
             (file.repeats, None)
         }
         Kind::OneRow(_) => {
@@ -276,6 +288,7 @@ fn agent_settings(
         label,
         name: file.name,
         repeats: repeats.unwrap_or(REPEATS),
+        searched,
         training,
         profile,
         without: file.without,

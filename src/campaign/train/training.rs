@@ -144,14 +144,10 @@ impl Training {
     /// If nothing can be learned any more.
     pub fn episode(&mut self) -> Result<TrainedEpisode, Diverged> {
         let number = self.next;
-        let road = number % self.arena.roads();
-        let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
         self.agent.progress(self.over());
         let exploration_epsilon = self.agent.exploration_epsilon();
-        let mut setup = self.arena.setup(road, seed);
-        setup.start.ambient = self.settings.conditions.ambient;
-        setup.proc = self.settings.hyperparameters.proc();
-        self.agent.begin(seed);
+        let setup = self.setup(number);
+        self.agent.begin(setup.seed);
         let played = play(&setup, self.agent.as_mut());
 
         let log = played.log;
@@ -176,6 +172,15 @@ impl Training {
             log,
             summary,
         })
+    }
+
+    /// Everything that the nth episode is made of but the choices.
+    pub fn setup(&self, number: usize) -> Setup {
+        let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
+        let mut setup = self.arena.setup(number % self.arena.roads(), seed);
+        setup.start.ambient = self.settings.conditions.ambient;
+        setup.proc = self.settings.hyperparameters.proc();
+        setup
     }
 
     /// The log of an episode with the collision probabilities that the space defines, where the agent learns with

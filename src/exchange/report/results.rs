@@ -27,7 +27,7 @@ How to read it:
 ";
 
 /// Measures that every study shows.
-const SHOWN: [&str; 2] = ["counted", "distinct"];
+const SHOWN: [&str; 3] = ["counted", "kinds", "kinds_per_h"];
 
 /// A study with what was kept of playing it.
 pub struct Chapter {
@@ -74,7 +74,7 @@ fn played_text(chapter: &Chapter, played: &Played) -> String {
         text.push_str(&published_text(table, played));
     }
     for (measure, question) in
-        [("counted", "Who counts more collisions"), ("distinct", "Who finds more distinct failures")]
+        [("counted", "Who counts more collisions"), ("kinds_per_h", "Who finds more kinds in an hour")]
     {
         text.push_str(&comparisons_text(measure, question, &roads));
     }
@@ -98,7 +98,10 @@ fn conditions_text(chapter: &Chapter, played: &Played) -> String {
     let mut alike: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for agent in &settings.agents {
         let size = match &agent.training {
-            None => counted(agent.repeats, "repetition"),
+            None if agent.searched == 0 => counted(agent.repeats, "repetition"),
+            None => {
+                format!("{} of {}", counted(agent.repeats, "repetition"), counted(agent.searched, "episode"))
+            }
             Some(plan) => {
                 format!("{} of {}", counted(agent.repeats, "training"), counted(plan.episodes, "episode"))
             }
@@ -152,7 +155,8 @@ fn title(measure: &str, played: &Played) -> String {
     let episodes = played.settings.evaluation.episodes;
     match measure {
         "counted" => format!("Counted collisions in {episodes} episodes:"),
-        "distinct" => format!("Distinct failures among them, in {episodes} episodes:"),
+        "kinds" => "Kinds of failures that recur, of everything that was found:".to_owned(),
+        "kinds_per_h" => "The same of an hour of everything that was simulated:".to_owned(),
         "ttfc_s" => "Time to the first counted collision, s, over the episodes that have one:".to_owned(),
         other => format!("`{other}`:"),
     }

@@ -9,7 +9,7 @@ use avastra_campaign::study::{
 const WIDTH_MAX: usize = 80;
 
 /// Measures by which comparisons are printed.
-const PRINTED_COMPARISONS: [&str; 2] = ["counted", "distinct"];
+const PRINTED_COMPARISONS: [&str; 2] = ["counted", "kinds_per_h"];
 
 /// All roads, one after another, and then all together.
 pub fn study(results: &StudyResults) -> String {
@@ -44,7 +44,7 @@ fn found_table(road: &RoadResults) -> String {
     let measures = [
         ("counted", "counted"),
         ("all", "collisions"),
-        ("distinct", "distinct"),
+        ("kinds", "kinds"),
         ("colliding episodes", "colliding"),
         ("TTFC s", "ttfc_s"),
         ("restricted s", "ttfc_restricted_s"),

@@ -135,7 +135,7 @@ pub(super) fn released() -> LearnerSettings {
 
 /// Ours: scaled variables, learning from the first few hundred transitions, a dueling head, and R_col only for
 /// collisions that count, paid where their obstacles were made. R_col, discount, averaging and how ε falls were chosen
-/// by trainings on the crossroad against `planning_never_yields` (`learner_choice.yaml`), with seeds that no other study uses.
+/// by trainings on the crossroad against `planning_never_yields`, on an engine that is gone, with seeds that no study uses.
 pub(super) fn avastra() -> LearnerSettings {
     let mut settings = LearnerSettings { preset: "avastra".to_owned(), ..paper() };
     settings.choice.state = StateSet::Extended;
