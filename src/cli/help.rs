@@ -96,6 +96,8 @@ diagnose runs/0001/critical/corner_0004.ava # what the crash hangs on
 diagnose --moment runs/0001/critical/corner_0004.ava # from when on it was certain
 diagnose runs/0001/critical/*.ava # how often each cause is at fault
 shrink runs/0001/critical/*.ava # write the smallest that still crash
+triage runs/0001 --known known.yaml --add # begin a file of known failures
+triage runs/0002 --known known.yaml # what is known, new and gone
 test runs/0001 # do its scenarios still crash?
 test runs/0001 --ads scenarios/ads/cautious.yaml --junit out.xml
 test runs/0001 --review # what has changed for each of them, in meaning
@@ -127,7 +129,7 @@ road scenarios/avastra45.ava --road corner --svg corner.svg # draw it";
 const GROUPS: &[(&str, &[&str])] = &[
     ("Write", &["new", "check", "fmt", "table", "compile", "road", "diff", "explain"]),
     ("Run", &["run", "train", "policy", "study", "estimate", "merge"]),
-    ("Understand", &["replay", "report", "render", "diagnose", "shrink"]),
+    ("Understand", &["replay", "report", "render", "diagnose", "shrink", "triage"]),
     ("Regress", &["test"]),
     ("Exchange", &["export", "import", "ads"]),
     ("Tools", &["lsp", "completions"]),

@@ -55,6 +55,7 @@ mod study;
 mod summary;
 mod test;
 mod train;
+mod triage;
 mod trials;
 mod why;
 
@@ -152,6 +153,7 @@ pub fn main_of(words: Vec<OsString>) -> u8 {
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(&output, arguments),
         Command::Shrink(arguments) => shrink::shrink(&output, arguments),
+        Command::Triage(arguments) => triage::triage(&output, arguments),
         Command::Export(arguments) => export::export(&output, arguments),
         Command::Import(arguments) => import::import(&output, arguments),
         Command::Test(arguments) => test::test(&output, arguments),

@@ -25,7 +25,7 @@ const STARTER: [(&str, &str); 3] = [
 pub const SHIPPED: [(&str, &str); 7] = [
     ("avastra45.ava", include_str!("../../scenarios/avastra45.ava")),
     ("roads.ava", include_str!("../../scenarios/roads.ava")),
-    ("sides.ava", include_str!("../../scenarios/sides.ava")),
+    ("lanes.ava", include_str!("../../scenarios/lanes.ava")),
     ("roads/boulevard.xodr", include_str!("../../scenarios/roads/boulevard.xodr")),
     ("roads/corner.xodr", include_str!("../../scenarios/roads/corner.xodr")),
     ("roads/crossroad.xodr", include_str!("../../scenarios/roads/crossroad.xodr")),
@@ -79,7 +79,7 @@ const CATALOGUE: [(&str, &str, Files); 4] = [
         &[
             ("motorway.ava", include_str!("../../scenarios/motorway.ava")),
             ("moves.ava", include_str!("../../scenarios/moves.ava")),
-            ("sides.ava", include_str!("../../scenarios/sides.ava")),
+            ("lanes.ava", include_str!("../../scenarios/lanes.ava")),
             ("roads/motorway.xodr", include_str!("../../scenarios/roads/motorway.xodr")),
         ],
     ),

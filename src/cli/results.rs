@@ -20,13 +20,16 @@ pub fn results(output: &Output, arguments: &ResultsArguments) -> Result<(), Fail
         let (settings, cells) = study::read(directory)?;
         let played = Played::new(settings, &cells, arguments.commit.clone());
         let chapter = chapter_of(&mut chapters, directory, &played)?;
-        let played = as_from_file(played, chapter);
         let path = kept(&arguments.studies, &chapter.name);
+        let mut played = as_from_file(played, chapter);
+        if let Some(kept) = chapter.played.take_if(|kept| kept.settings == played.settings) {
+            played = kept.and(played).map_err(|reason| Failure::file("add", directory, reason))?;
+        }
         if let Some(kept) = chapter.played.as_ref().filter(|kept| kept.cells.len() > played.cells.len()) {
             let (more, less) = (kept.cells.len(), plural(played.cells.len(), "cell"));
             let path = path.shown();
             let reason = format!(
-                "it has {less}, and `{path}` has {more}: `avastra merge` brings shards together; to keep less, remove that file"
+                "it has {less}, and `{path}` has {more} of other settings: to keep less, remove that file"
             );
             return Err(Failure::file("add", directory, reason));
         }

@@ -248,6 +248,21 @@ shrink
   scenarios[] object `file`, `output`, steps and actions before and after, what was kept and traded (`worth_before`, `worth`, the `requirement` of a breach), other findings that are `gone`, claims `refuted`
   REPRODUCIBLE
   FAILED
+triage
+  simulated_h number simulated time of the runs, h
+  known[].name text a known failure of which something was found
+  known[].episodes number episodes with a finding of it that recurs
+  known[].scenario text the scenario of the first
+  known[].before object? `episodes` and `hours` when it was named
+  gone[].name text a known failure of which nothing was found
+  gone[].before object? as in `known`
+  gone[].chance number? the chance to find nothing of it although it comes as before
+  new[].name text the kind of findings that no rule fits
+  new[].episodes number as in `known`
+  new[].scenario text as in `known`
+  new[].before object? always null
+  unsure number findings that were not shown to recur; they are left out
+  added number kinds that `--add` wrote
 test
   still_fails number scenarios with the same crash
   fixed number scenarios without a failure, whose rate of failures under other noise is below `--below` with 95 %

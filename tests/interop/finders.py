@@ -1,4 +1,4 @@
-"""What each finder finds in the same simulated time, everything charged: `finders.py AVASTRA CELLS [--hours H] [--repeats N] [--drivers NAME,…]`.
+"""What each finder finds in the same simulated time, everything charged: `finders.py AVASTRA CELLS [--hours H] [--repeats N] [--drivers NAME;…] [--finders NAME,…]`.
 
 Each finder searches a space for so many simulated hours against each driving system, in independent repetitions (seeds 1 to N). What it finds while it
 learns counts; nothing is played after it. A run ends after whole rounds, so it plays some minutes more. A cell is the number of kinds of failures that recur, and the processor time with all judging and replays.
@@ -37,6 +37,12 @@ DRIVERS = {
     "never yields": ("avastra45.ava", FAULTS / "planning_never_yields.yaml"),
     "flickers": ("avastra45.ava", FAULTS / "perception_flicker.yaml"),
     "dirty sensors": ("manoeuvres.ava", ROOT / "scenarios/ads/degraded.yaml"),
+}
+COMPARED = ";".join(DRIVERS)
+#: The same driving systems in the paper's space under the law, and in the town.
+DRIVERS |= {
+    f"{ads}, {space}": (f"{space}.ava", ads)
+    for ads in ("reactive", "idm", "modular") for space in ("avastra45_law", "town")
 }
 BASELINES = ("random", "bandit")
 
@@ -139,14 +145,15 @@ def main():
     parser.add_argument("cells", type=pathlib.Path)
     parser.add_argument("--hours", type=float, default=2.0)
     parser.add_argument("--repeats", type=int, default=10)
-    parser.add_argument("--drivers", default=",".join(DRIVERS))
+    parser.add_argument("--drivers", default=COMPARED)
+    parser.add_argument("--finders", default=",".join(FINDERS))
     options = parser.parse_args()
     engine = re.search(r"\w+/\d+", subprocess.run([options.avastra, "--version"], check=True, capture_output=True, text=True).stdout)[0]
     known = [json.loads(line) for line in options.cells.read_text().splitlines()] if options.cells.exists() else []
     is_asked = lambda cell: (cell["engine"], cell["hours"]) == (engine, options.hours)  # noqa: E731
     others = [cell for cell in known if not is_asked(cell)]
     cells = {(cell["driver"], cell["finder"], cell["seed"]): cell for cell in known if is_asked(cell)}
-    wanted = itertools.product(range(1, options.repeats + 1), options.drivers.split(","), FINDERS)
+    wanted = itertools.product(range(1, options.repeats + 1), options.drivers.split(";"), options.finders.split(","))
     for seed, driver, finder in wanted:
         if (driver, finder, seed) not in cells:
             cells[driver, finder, seed] = {"engine": engine, **played(os.path.abspath(options.avastra), driver, finder, seed, options.hours)}

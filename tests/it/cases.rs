@@ -48,7 +48,7 @@ pub fn copy_space(folder: &Path) {
     std::fs::create_dir_all(folder.join("roads")).expect("it is writable");
     let roads = ["corner", "residential", "boulevard", "crossroad"].map(|road| format!("roads/{road}.xodr"));
     for name in
-        ["avastra45.ava", "roads.ava", "sides.ava"].into_iter().chain(roads.iter().map(String::as_str))
+        ["avastra45.ava", "roads.ava", "lanes.ava"].into_iter().chain(roads.iter().map(String::as_str))
     {
         std::fs::copy(root().join("scenarios").join(name), folder.join(name)).expect("it is shipped");
     }

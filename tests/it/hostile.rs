@@ -346,7 +346,7 @@ impl Scratch {
         };
         let shipped = root().join("scenarios");
         copy(shipped.join("roads.ava"), "roads.ava");
-        copy(shipped.join("sides.ava"), "sides.ava");
+        copy(shipped.join("lanes.ava"), "lanes.ava");
         std::fs::create_dir(folder.path().join("roads")).expect("the folder is writable");
         for entry in std::fs::read_dir(shipped.join("roads")).expect("it is there").flatten() {
             copy(entry.path(), &format!("roads/{}", entry.file_name().display()));

@@ -128,6 +128,40 @@ fn results_are_as_explain_describes_them() {
     quick.iter().for_each(|arguments| drop(is_as_described(arguments)));
 }
 
+/// What is known, what is gone and what is new, and then what `--add` has made of it.
+#[test]
+fn failures_that_have_a_name_are_known_again() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let at = |name: &str| scratch.path().join(name).display().to_string();
+    let (run, known) = (at("run"), at("known.yaml"));
+    done(&["new", &at("town")]);
+    let fault = "scenarios/ads/faults/planning_never_yields.yaml";
+    done(&["run", &at("town/space.ava"), "--hours", "0.5", "--seed", "4", "--ads", fault, "--out", &run]);
+    // A file that is not there is no empty one.
+    let (status, _, stderr) = outcome(&mut avastra(&["triage", &run, "--known", &known]));
+    assert!(status == 1 && stderr.contains("--add` begins it"), "{status}: {stderr}");
+    let text = "# Ours\n- name: PLAN-118\n  where: { precrash: 11, road: [corner, avenue] }\n\
+                - { name: PLAN-7, where: { requirement: goes_on }, seen: { episodes: 3, hours: 10 } }\n";
+    std::fs::write(&known, text).expect("it is writable");
+    let found = is_as_described(&["triage", &run, "--known", &known]);
+    let names = |found: &Value, of: &str| -> Vec<String> {
+        let all = found[of].as_array().expect("a list");
+        all.iter().map(|one| one["name"].as_str().expect("a name").to_owned()).collect()
+    };
+    let new = "12 pedestrian, the vehicle making no manoeuvre";
+    assert_eq!(
+        [names(&found, "known"), names(&found, "gone"), names(&found, "new")],
+        [["PLAN-118"], ["PLAN-7"], [new]]
+    );
+    let failing = ["triage", &run, "--known", &known, "--fail-on-new"];
+    assert_eq!(outcome(&mut avastra(&failing)).0, 4);
+    assert_eq!(std::fs::read_to_string(&known).expect("it is readable"), text, "only `--add` writes");
+    done(&["triage", &run, "--known", &known, "--add"]);
+    let added = std::fs::read_to_string(&known).expect("it is readable");
+    assert!(added.starts_with(text), "{added}");
+    assert_eq!(outcome(&mut avastra(&failing)).0, 0, "{added}");
+}
+
 #[test]
 fn results_of_drives_are_as_explain_describes_them() {
     let scratch = tempfile::tempdir().expect("a scratch directory");

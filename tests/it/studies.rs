@@ -179,7 +179,7 @@ fn two_baselines_are_compared_once() {
 fn kept_and_written_again(scratch: &Path, played: &Path) {
     let scenarios = scratch.join("scenarios");
     std::fs::create_dir_all(scenarios.join("studies")).expect("it is writable");
-    for shared in ["avastra45.ava", "roads.ava", "sides.ava", "roads", "ads"] {
+    for shared in ["avastra45.ava", "roads.ava", "lanes.ava", "roads", "ads"] {
         let link = scenarios.join(shared);
         std::os::unix::fs::symlink(root().join("scenarios").join(shared), link).expect("links can be made");
     }
@@ -223,13 +223,21 @@ fn kept_and_written_again(scratch: &Path, played: &Path) {
     let last = lines.lines().last().expect("it has cells");
     let more = last.replacen("\"number\":0", "\"number\":9", 1);
     assert_ne!(more, last, "the last cell is the first of its agent");
-    refused(&sealed(&format!("{lines}{more}\n")), "`avastra merge` brings shards together");
+    let of_others = format!("{lines}{more}\n").replacen("\"first_seed\":5", "\"first_seed\":6", 1);
+    refused(&sealed(&of_others), "of other settings");
     refused(&sealed(&format!("{lines}{last}\n")), "this cell is there already");
     // Figures that were changed are refused, too.
     let edited = lines.replacen("\"values\":[", "\"values\":[1", 1);
     assert_ne!(edited, lines);
     refused(&text.replacen(lines, &edited, 1), "it was changed since it was written");
     refused(lines, "its last line is not the seal of those before");
+    // A cell that was played before must have come out the same.
+    refused(&sealed(&edited), "differs from the one that is kept");
+    // A part of the same study is completed.
+    let without_last = lines.strip_suffix(&format!("{last}\n")).expect("it is the last line");
+    std::fs::write(&kept, sealed(without_last)).expect("it is writable");
+    assert_eq!(write(&["--add", &played.display().to_string(), "--commit", "0123abc"]), first);
+    assert_eq!(std::fs::read_to_string(&kept).expect("it is readable"), text);
 
     // Another world is told. No other one has the episodes of this one.
     for (world, is_told) in [("plane/7", true), (ENGINE, false)] {

@@ -121,7 +121,7 @@ class Pickles(unittest.TestCase):
     def test_a_space_that_has_changed_is_refused(self):
         with tempfile.TemporaryDirectory() as folder:
             shutil.copytree(SPACE.parent / "roads", Path(folder) / "roads")
-            for name in ("avastra45.ava", "roads.ava", "sides.ava"):
+            for name in ("avastra45.ava", "roads.ava", "lanes.ava"):
                 shutil.copy(SPACE.parent / name, folder)
             file = Path(folder) / "avastra45.ava"
             kept = pickle.dumps(avastra.compile(file))

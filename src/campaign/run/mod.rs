@@ -26,6 +26,7 @@ mod stage;
 mod stepped;
 mod summary;
 mod threads;
+pub mod triage;
 
 pub use arena::{Arena, choose, road_named};
 pub(crate) use arena::{Offers, legal};

@@ -87,13 +87,41 @@ fn read_head(line: &str) -> Result<Head, serde_json::Error> {
 impl Played {
     /// The kept figures of a study's cells, in the order of agents, roads and numbers.
     pub fn new(settings: StudySettings, cells: &[CellRecord], commit: Option<String>) -> Played {
-        let mut cells: Vec<MeasuredCell> =
-            cells.iter().map(|cell| MeasuredCell::new(cell, &settings.evaluation)).collect();
-        cells.sort_by_key(|cell| {
-            let agent = settings.agents.iter().position(|agent| agent.label == cell.agent);
-            (agent, settings.conditions.roads.iter().position(|road| *road == cell.road), cell.number)
+        let cells = cells.iter().map(|cell| MeasuredCell::new(cell, &settings.evaluation)).collect();
+        Played { commit, settings, cells }.in_order()
+    }
+
+    /// With the cells of another part of the same study.
+    ///
+    /// # Errors
+    /// If a cell that both have differs in more than the time that it took.
+    pub fn and(self, other: Played) -> Result<Played, String> {
+        let mut cells = self.cells;
+        for cell in other.cells {
+            let is_it = |known: &&MeasuredCell| {
+                (&known.agent, &known.road, known.number) == (&cell.agent, &cell.road, cell.number)
+            };
+            match cells.iter().find(is_it) {
+                Some(known) if known.values == cell.values => {}
+                Some(MeasuredCell { agent, road, number, .. }) => {
+                    return Err(format!(
+                        "its cell of `{agent}` on `{road}`, number {number}, differs from the one that is kept"
+                    ));
+                }
+                None => cells.push(cell),
+            }
+        }
+        Ok(Played { cells, commit: other.commit, ..self }.in_order())
+    }
+
+    /// With its cells in the order of agents, roads and numbers.
+    fn in_order(mut self) -> Played {
+        let StudySettings { agents, conditions, .. } = &self.settings;
+        self.cells.sort_by_key(|cell| {
+            let agent = agents.iter().position(|agent| agent.label == cell.agent);
+            (agent, conditions.roads.iter().position(|road| *road == cell.road), cell.number)
         });
-        Played { commit, settings, cells }
+        self
     }
 
     pub fn to_text(&self) -> String {

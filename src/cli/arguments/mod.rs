@@ -21,7 +21,7 @@ pub use learn::{
 pub use scenarios::{
     DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportProfile, FilesArguments,
     ImportArguments, RenderArguments, ReplayArguments, ReportArguments, RoadArguments, ShrinkArguments,
-    TestArguments,
+    TestArguments, TriageArguments,
 };
 
 /// Reads the seed of an argument.
@@ -116,6 +116,8 @@ pub enum Command {
     Diagnose(DiagnoseArguments),
     /// Find the smallest scenario that still makes the same crash.
     Shrink(ShrinkArguments),
+    /// Sort what runs found into known, new and gone failures.
+    Triage(TriageArguments),
     /// Play emitted scenarios as a regression suite.
     Test(TestArguments),
     /// Write scenarios for other tools, or as a folder that can be moved.

@@ -80,6 +80,22 @@ pub struct ShrinkArguments {
 }
 
 #[derive(Debug, Args)]
+pub struct TriageArguments {
+    /// Directories of runs and trainings.
+    #[arg(required = true, value_name = "DIR")]
+    pub directories: Vec<PathBuf>,
+    /// The file of known failures: a list in YAML, each with a `name` and a rule over the facts of a finding (`where`).
+    #[arg(long, value_name = "FILE")]
+    pub known: PathBuf,
+    /// Add each new kind to FILE. A file that is not there is begun.
+    #[arg(long)]
+    pub add: bool,
+    /// Exit with status 4 if there is a new kind.
+    #[arg(long)]
+    pub fail_on_new: bool,
+}
+
+#[derive(Debug, Args)]
 pub struct ExportArguments {
     /// What to write: `openscenario` (`.xosc`, with its map beside it), `commonroad` (XML 2020a), `csv` (a row for each
     /// road user and tick), or `ava`: copies of scenarios and policies with all that they use, in a folder that can be moved.

@@ -46,6 +46,7 @@ pub fn results(folder: &str, chapters: &[Chapter]) -> String {
     let mut chapters: Vec<&Chapter> = chapters.iter().collect();
     chapters.sort_by_key(|chapter| (chapter.file.published.is_empty(), chapter.name.clone()));
     let mut text = HEAD.replace("{folder}", folder);
+    text.push_str(&answers_text(&chapters));
     for chapter in chapters {
         let Chapter { name, command, file, .. } = chapter;
         text.push_str(&format!("\n## {name}\n"));
@@ -58,6 +59,68 @@ pub fn results(folder: &str, chapters: &[Chapter]) -> String {
         }
     }
     text
+}
+
+/// The measures by which the answers say who finds more.
+const ANSWERED: [(&str, &str); 2] =
+    [("counted", "collisions after training"), ("kinds_per_h", "kinds an hour")];
+
+/// Of each study that was played in full: whom it tells apart from its first baseline, by road.
+fn answers_text(chapters: &[&Chapter]) -> String {
+    let (mut rows, mut open) = (Vec::new(), Vec::new());
+    for Chapter { name, played, file, wanted, .. } in chapters {
+        let Some(baseline) = file.baselines.first() else { continue };
+        // A part of a study tells nobody apart.
+        let Some(played) = played.as_ref().filter(|played| played.departures(wanted).smaller.is_empty())
+        else {
+            open.push(name.as_str());
+            continue;
+        };
+        let roads = measured_roads(&played.settings, &played.cells);
+        for agent in played.settings.agents.iter().filter(|agent| agent.label != *baseline) {
+            let answer = |measure: &str| answer(&roads, measure, &agent.label, baseline);
+            let answers: Vec<String> = ANSWERED.iter().filter_map(|(measure, _)| answer(measure)).collect();
+            if answers.len() == ANSWERED.len() {
+                let compared = vec![name.clone(), format!("{} / {baseline}", agent.label)];
+                rows.push([compared, answers].concat());
+            }
+        }
+    }
+    if rows.is_empty() && open.is_empty() {
+        return String::new();
+    }
+    let unanswered = match open.is_empty() {
+        true => String::new(),
+        false => format!("\nNot answered, because not played in full: {}.\n", open.join(", ")),
+    };
+    if rows.is_empty() {
+        return format!("\n## Answers\n{unanswered}");
+    }
+    let head = ["study", "comparison"].into_iter().chain(ANSWERED.map(|(_, words)| words));
+    format!(
+        "\n## Answers\n\nOn how many roads the first of two finds more, finds less, and is not told apart (p ≥ {P_MAX} after Holm's \
+         correction over the study). A kind counts if it recurs, and the training is charged.\n\n{}{unanswered}",
+        table(head, rows)
+    )
+}
+
+/// How many roads tell an agent apart from a baseline by a measure; `None` if they were not compared.
+fn answer(roads: &[MeasuredRoad], measure: &str, agent: &str, baseline: &str) -> Option<String> {
+    let all = roads.iter().flat_map(|road| &road.comparisons).filter(|one| one.measure == measure);
+    let (mut more, mut less, mut open) = (0, 0, 0);
+    for one in all {
+        let superiority = match (one.agent == agent, one.baseline == agent) {
+            (true, false) if one.baseline == baseline => one.superiority,
+            (false, true) if one.agent == baseline => 1.0 - one.superiority,
+            _ => continue,
+        };
+        match one.p_holm < P_MAX {
+            false => open += 1,
+            true if superiority > 0.5 => more += 1,
+            true => less += 1,
+        }
+    }
+    (more + less + open > 0).then(|| format!("{more} more, {less} less, {open} open"))
 }
 
 fn played_text(chapter: &Chapter, played: &Played) -> String {
