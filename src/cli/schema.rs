@@ -254,6 +254,7 @@ triage
   known[].episodes number episodes with a finding of it that recurs
   known[].scenario text the scenario of the first
   known[].before object? `episodes` and `hours` when it was named
+  open list known failures of which findings are there, but none was shown to recur: as `known`
   gone[].name text a known failure of which nothing was found
   gone[].before object? as in `known`
   gone[].chance number? the chance to find nothing of it although it comes as before

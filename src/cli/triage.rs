@@ -1,5 +1,7 @@
 //! `avastra triage`: what runs found, sorted into failures that a file knows, kinds that are new, and failures that are gone.
 
+use std::collections::BTreeSet;
+
 use avastra_base::outside::Shown;
 use avastra_campaign::run::triage::{FoundFailures, GoneFailures, Seen, Sorted, named, read_known, sort};
 use avastra_campaign::run::{Database, DatabaseError};
@@ -23,20 +25,25 @@ pub fn triage(output: &Output, arguments: &TriageArguments) -> Result<(), Failur
         _ => load::text(known)?,
     };
     let failures = read_known(&text).map_err(wrong)?;
-    let (mut facts, mut unsure, mut simulated_h) = (Vec::new(), 0, 0.0);
+    let (mut facts, mut simulated_h, mut seen) = (Vec::new(), 0.0, BTreeSet::new());
     for directory in directories {
+        if !seen.insert(directory.canonicalize().unwrap_or_else(|_| directory.clone())) {
+            return Err(Failure::usage(format!(
+                "`{}` is named twice: its findings would count twice",
+                directory.shown()
+            )));
+        }
         let file = directory.join("run.db");
         let unread = |error: DatabaseError| Failure::file("read", &file, error);
         let settings = load::text(&directory.join("run.yaml"))?;
         let (database, remark) = run_directory::open_to_read::<Database>(&file, &settings)?;
         remark.iter().for_each(|remark| output.warn(remark));
-        let (found, left_out) = database.facts().map_err(unread)?;
+        let found = database.facts().map_err(unread)?;
         // Scenarios of two runs may have one name.
         facts.extend(found.into_iter().map(|fact| fact.of(&directory.shown().to_string())));
-        unsure += left_out;
         simulated_h += database.left(None).map_err(unread)?.simulated_h;
     }
-    let sorted = sort(&failures, (&facts, unsure), simulated_h);
+    let sorted = sort(&failures, &facts, simulated_h);
     output.say(&in_words(&sorted));
     if *add && !sorted.new.is_empty() {
         let separated = if text.is_empty() || text.ends_with('\n') { "" } else { "\n" };
@@ -56,7 +63,7 @@ pub fn triage(output: &Output, arguments: &TriageArguments) -> Result<(), Failur
     }
     let added = if *add { sorted.new.len() } else { 0 };
     output.result(serde_json::json!({
-        "simulated_h": sorted.simulated_h, "known": sorted.known, "gone": sorted.gone, "new": sorted.new,
+        "simulated_h": sorted.simulated_h, "known": sorted.known, "open": sorted.open, "gone": sorted.gone, "new": sorted.new,
         "unsure": sorted.unsure, "added": added,
     }));
     match sorted.new.len() {
@@ -66,7 +73,7 @@ pub fn triage(output: &Output, arguments: &TriageArguments) -> Result<(), Failur
 }
 
 fn in_words(sorted: &Sorted) -> String {
-    let Sorted { simulated_h, known, gone, new, unsure } = sorted;
+    let Sorted { simulated_h, known, open, gone, new, unsure } = sorted;
     let seen = |seen: &Seen| format!("{} in {:.1} h", plural(seen.episodes as usize, "episode"), seen.hours);
     let found = |one: &FoundFailures| {
         let before =
@@ -88,6 +95,10 @@ fn in_words(sorted: &Sorted) -> String {
         }
     };
     part(format!("known: {}", plural(known.len(), "failure")), known.iter().map(found).collect());
+    part(
+        format!("seen, but not shown to recur: {}", plural(open.len(), "failure")),
+        open.iter().map(found).collect(),
+    );
     part(format!("gone: {}", plural(gone.len(), "failure")), gone.iter().map(missing).collect());
     part(format!("new: {}", plural(new.len(), "kind")), new.iter().map(found).collect());
     if known.is_empty() && new.is_empty() {

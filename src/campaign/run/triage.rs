@@ -61,10 +61,12 @@ pub struct Seen {
     pub hours: f64,
 }
 
-/// A finding that recurs, by its facts.
+/// A finding, by its facts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fact {
     pub scenario: String,
+    /// Whether it recurs.
+    pub recurs: bool,
     words: BTreeMap<&'static str, String>,
     numbers: BTreeMap<&'static str, f64>,
 }
@@ -74,10 +76,12 @@ pub struct Fact {
 pub struct Sorted {
     pub simulated_h: f64,
     pub known: Vec<FoundFailures>,
+    /// Known failures of which findings are there, but none that was shown to recur.
+    pub open: Vec<FoundFailures>,
     pub gone: Vec<GoneFailures>,
     /// The kinds of what no rule fits.
     pub new: Vec<FoundFailures>,
-    /// Findings that were not shown to recur. They are left out.
+    /// Findings that no rule fits and that were not shown to recur. They are left out.
     pub unsure: usize,
 }
 
@@ -188,11 +192,11 @@ impl Known {
 }
 
 impl Database {
-    /// The findings that recur, by their facts, and how many were not shown to.
+    /// All findings, by their facts.
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub fn facts(&self) -> Result<(Vec<Fact>, usize), DatabaseError> {
+    pub fn facts(&self) -> Result<Vec<Fact>, DatabaseError> {
         let query = "SELECT episode, road, recurred, replays, precrash_number, precrash, cause, NULL AS requirement,
                     coalesce(own_body, body), verb, side, approach, shape, priority, ego_speed_mps, closing_speed_mps, harm_share
              FROM collision JOIN episode USING (episode) WHERE collision.counted
@@ -200,7 +204,7 @@ impl Database {
                     NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL
              FROM breach JOIN episode USING (episode) GROUP BY episode, requirement
              ORDER BY episode";
-        let all = query_all(&self.connection, query, |row| {
+        query_all(&self.connection, query, |row| {
             let (episode, road): (i64, String) = (row.get(0)?, row.get(1)?);
             let recurrence = from_columns(row.get(2)?, row.get(3)?);
             let number: Option<u32> = row.get(4)?;
@@ -227,20 +231,25 @@ impl Database {
             for (at, fact) in NUMBERS[1..].iter().enumerate() {
                 numbers.extend(row.get::<_, Option<f64>>(14 + at)?.map(|value| (*fact, value)));
             }
-            Ok((Fact { scenario, words, numbers }, recurrence.is_some_and(Recurrence::recurs)))
-        })?;
-        let count = all.len();
-        let sure: Vec<Fact> = all.into_iter().filter(|(_, recurs)| *recurs).map(|(fact, _)| fact).collect();
-        let unsure = count - sure.len();
-        Ok((sure, unsure))
+            let recurs = recurrence.is_some_and(Recurrence::recurs);
+            Ok(Fact { scenario, recurs, words, numbers })
+        })
     }
 }
 
 /// Sorts the findings of a run into the first known failure whose rule fits, or else by their kinds.
-pub fn sort(failures: &[Known], (facts, unsure): (&[Fact], usize), simulated_h: f64) -> Sorted {
+pub fn sort(failures: &[Known], facts: &[Fact], simulated_h: f64) -> Sorted {
     let mut known: BTreeMap<usize, BTreeSet<&str>> = BTreeMap::new();
     let mut new: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
-    for finding in facts {
+    let mut open: BTreeMap<usize, BTreeSet<&str>> = BTreeMap::new();
+    let mut unsure = 0;
+    for finding in facts.iter().filter(|finding| !finding.recurs) {
+        match failures.iter().position(|failure| failure.fits(finding)) {
+            Some(failure) => drop(open.entry(failure).or_default().insert(&finding.scenario)),
+            None => unsure += 1,
+        }
+    }
+    for finding in facts.iter().filter(|finding| finding.recurs) {
         match failures.iter().position(|failure| failure.fits(finding)) {
             Some(failure) => drop(known.entry(failure).or_default().insert(&finding.scenario)),
             None => drop(new.entry(&finding.words["kind"]).or_default().insert(&finding.scenario)),
@@ -252,13 +261,14 @@ pub fn sort(failures: &[Known], (facts, unsure): (&[Fact], usize), simulated_h: 
         scenario: scenarios.first().map_or(String::new(), |first| (*first).to_owned()),
         before,
     };
-    let gone = failures.iter().enumerate().filter(|(at, _)| !known.contains_key(at)).map(|(_, failure)| {
-        GoneFailures {
-            name: failure.name.clone(),
-            before: failure.seen,
-            chance: failure.seen.map(|seen| seen.chance_of_none(simulated_h)),
-        }
-    });
+    let gone =
+        failures.iter().enumerate().filter(|(at, _)| !known.contains_key(at) && !open.contains_key(at)).map(
+            |(_, failure)| GoneFailures {
+                name: failure.name.clone(),
+                before: failure.seen,
+                chance: failure.seen.map(|seen| seen.chance_of_none(simulated_h)),
+            },
+        );
     let mut new: Vec<FoundFailures> =
         new.iter().map(|(name, scenarios)| found(name, scenarios, None)).collect();
     new.sort_by_key(|kind| core::cmp::Reverse(kind.episodes));
@@ -267,6 +277,11 @@ pub fn sort(failures: &[Known], (facts, unsure): (&[Fact], usize), simulated_h: 
         gone: gone.collect(),
         known: known
             .iter()
+            .map(|(&at, found_in)| found(&failures[at].name, found_in, failures[at].seen))
+            .collect(),
+        open: open
+            .iter()
+            .filter(|(at, _)| !known.contains_key(at))
             .map(|(&at, found_in)| found(&failures[at].name, found_in, failures[at].seen))
             .collect(),
         new,
@@ -288,7 +303,8 @@ mod tests {
 
     fn finding(scenario: &str, kind: &str, road: &str, speed: f64) -> Fact {
         let words = BTreeMap::from([("kind", kind.to_owned()), ("road", road.to_owned())]);
-        Fact { scenario: scenario.to_owned(), words, numbers: BTreeMap::from([("ego_speed_mps", speed)]) }
+        let numbers = BTreeMap::from([("ego_speed_mps", speed)]);
+        Fact { scenario: scenario.to_owned(), recurs: true, words, numbers }
     }
 
     #[test]
@@ -305,7 +321,8 @@ mod tests {
             finding("corner_0002", "11 pedestrian", "corner", 2.0),
             finding("avenue_0003", "11 pedestrian", "avenue", 2.0),
         ];
-        let sorted = sort(&failures, (&facts, 2), 10.0);
+        let unsure = Fact { recurs: false, ..finding("avenue_0004", "27 left turn", "avenue", 3.0) };
+        let sorted = sort(&failures, &[&facts[..], &[unsure]].concat(), 10.0);
         let named = |all: &[FoundFailures]| -> Vec<(String, u64, String)> {
             all.iter().map(|one| (one.name.clone(), one.episodes, one.scenario.clone())).collect()
         };
@@ -315,14 +332,20 @@ mod tests {
             [known("fast ones", "corner_0001"), known("the rest", "corner_0002")]
         );
         assert_eq!(named(&sorted.new), [known("11 pedestrian", "avenue_0003")]);
-        assert_eq!((sorted.gone.len(), sorted.gone[0].name.as_str(), sorted.unsure), (1, "old", 2));
+        assert_eq!((sorted.gone.len(), sorted.gone[0].name.as_str(), sorted.unsure), (1, "old", 1));
         // Three in ten hours, none in ten more: (1/2) to the power of four.
         assert!((sorted.gone[0].chance.expect("it was seen before") - 0.0625).abs() < 1e-12);
         // What is named is known the next time.
         let text = serde_yaml::to_string(&super::named(&sorted.new, 9.96)).expect("it can be written");
         let again = read_known(&text).expect("it can be read");
         assert_eq!(again[0].seen, Some(Seen { episodes: 1, hours: 10.0 }));
-        assert_eq!(sort(&again, (&facts[3..], 0), 1.0).new, []);
+        assert_eq!(sort(&again, &facts[3..], 1.0).new, []);
+        // What was seen and not shown to recur is not gone.
+        let open = sort(&again, &[Fact { recurs: false, ..facts[3].clone() }], 1.0);
+        assert_eq!(
+            (open.known.len(), open.gone.len(), named(&open.open)),
+            (0, 0, vec![known("11 pedestrian", "avenue_0003")])
+        );
     }
 
     #[test]
