@@ -180,10 +180,13 @@ impl Database {
 /// requirement, which has none. `None` of what is not a kind.
 pub(crate) fn kind_name(number: Option<u32>, name: &str, cause: Option<&str>) -> Option<String> {
     let is_kind = number != PreCrash::Other.number() && name != PreCrash::Wreck.name();
-    is_kind.then(|| match number {
-        None => name.to_owned(),
-        Some(number) => format!("{number} {name}{}", cause_text(cause)),
-    })
+    is_kind.then(|| kind_text(number, name, cause))
+}
+
+/// As [`kind_name`], also of what is not a kind.
+pub(super) fn kind_text(number: Option<u32>, name: &str, cause: Option<&str>) -> String {
+    let number = number.map_or(String::new(), |number| format!("{number} "));
+    format!("{number}{name}{}", cause_text(cause))
 }
 
 /// What recurs in which episode.

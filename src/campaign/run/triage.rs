@@ -8,7 +8,7 @@ use avastra_lang::syntax::{listed, nearest, read_yaml};
 use crate::oracle::Recurrence;
 use crate::run::database::{Database, from_columns};
 use crate::run::findings::scenario_name;
-use crate::run::groups::cause_text;
+use crate::run::left::kind_text;
 use crate::run::sealed::{DatabaseError, query_all};
 
 /// The facts of a finding that are words.
@@ -210,10 +210,7 @@ impl Database {
             let number: Option<u32> = row.get(4)?;
             let (precrash, requirement): (Option<String>, Option<String>) = (row.get(5)?, row.get(7)?);
             let cause: Option<String> = row.get(6)?;
-            let kind = precrash.map(|name| {
-                let number = number.map_or(String::new(), |number| format!("{number} "));
-                format!("{number}{name}{}", cause_text(cause.as_deref()))
-            });
+            let kind = precrash.map(|name| kind_text(number, &name, cause.as_deref()));
             let scenario = scenario_name(&road, episode);
             let mut words: BTreeMap<&'static str, String> = BTreeMap::new();
             let mut note = |fact, value: Option<String>| drop(value.map(|value| words.insert(fact, value)));
@@ -221,9 +218,8 @@ impl Database {
             note("requirement", requirement);
             note("road", Some(road));
             note("cause", cause);
-            for (at, fact) in
-                ["body", "verb", "side", "approach", "shape", "priority"].into_iter().enumerate()
-            {
+            // From the body to the priority, in the order of the query.
+            for (at, fact) in WORDS[3..9].iter().enumerate() {
                 note(fact, row.get(8 + at)?);
             }
             let mut numbers: BTreeMap<&'static str, f64> = BTreeMap::new();
@@ -243,17 +239,17 @@ pub fn sort(failures: &[Known], facts: &[Fact], simulated_h: f64) -> Sorted {
     let mut new: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     let mut open: BTreeMap<usize, BTreeSet<&str>> = BTreeMap::new();
     let mut unsure = 0;
-    for finding in facts.iter().filter(|finding| !finding.recurs) {
-        match failures.iter().position(|failure| failure.fits(finding)) {
-            Some(failure) => drop(open.entry(failure).or_default().insert(&finding.scenario)),
-            None => unsure += 1,
-        }
-    }
-    for finding in facts.iter().filter(|finding| finding.recurs) {
-        match failures.iter().position(|failure| failure.fits(finding)) {
-            Some(failure) => drop(known.entry(failure).or_default().insert(&finding.scenario)),
-            None => drop(new.entry(&finding.words["kind"]).or_default().insert(&finding.scenario)),
-        }
+    for finding in facts {
+        let scenarios = match (failures.iter().position(|failure| failure.fits(finding)), finding.recurs) {
+            (Some(failure), true) => known.entry(failure).or_default(),
+            (Some(failure), false) => open.entry(failure).or_default(),
+            (None, true) => new.entry(&finding.words["kind"]).or_default(),
+            (None, false) => {
+                unsure += 1;
+                continue;
+            }
+        };
+        scenarios.insert(&finding.scenario);
     }
     let found = |name: &str, scenarios: &BTreeSet<&str>, before| FoundFailures {
         name: name.to_owned(),

@@ -10,7 +10,7 @@ use crate::oracle::{Breached, REPLAYS, Recurrence};
 use crate::run::{EpisodeSummary, kind_name};
 
 /// Findings of a kind that are played again, those with the shortest scenarios. If none of them recurs, the kind is not counted.
-/// Ours: against `perception_flicker`, two of three collisions are flukes, and one training finds hundreds.
+/// Ours: against a detector that flickers most collisions are flukes, and one training finds many.
 const TRIED: usize = 20;
 
 /// The findings of a cell.
